@@ -1,0 +1,43 @@
+//! The scene as both backends read it: flat arrays of plain records, f32, positions relative to an anchor near the camera.
+//!
+//! Every record here has a WGSL struct of the same name and field order in `shaders/bindings.wgsl`; a test compares the two by reflection.
+//! Triangle ids are global: real triangles come first (`0..Frame::real_triangle_count`), virtual ones after.
+
+mod records;
+
+pub use records::*;
+
+use crate::accel::WorldBvh;
+
+/// Index that stands for "none" in every u32 reference.
+pub const NONE: u32 = u32::MAX;
+
+/// Bounding spheres of the virtual geometry, at most this many.
+pub const MAX_SPHERES: usize = 16;
+
+/// What a backend renders.
+pub struct PackedScene {
+    pub frame: Frame,
+    /// Anchor in world space, metres; `position_world = position_packed + anchor`.
+    pub anchor_m: [f64; 3],
+    /// Built over the real triangles; hit ids are global ids.
+    pub real_bvh: WorldBvh,
+    pub virtual_bvh: WorldBvh,
+    /// By global triangle id.
+    pub triangles: Vec<Triangle>,
+    pub vertices: Vec<Vertex>,
+    pub materials: Vec<Material>,
+    pub texture_refs: Vec<TextureRef>,
+    /// RGBA8 texels of all textures, one after the other.
+    pub texels: Vec<u32>,
+    /// Light 0.. in selection order; empty without lights.
+    pub lights: Vec<Light>,
+    /// Environment texels, three floats each, row-major; empty for a constant environment or none.
+    pub env_texels: Vec<f32>,
+    /// One entry a cell of the environment (see `light::environment`).
+    pub env_alias: Vec<AliasEntry>,
+    /// Albedo of the photograph's pixels for `albedo = "from-photo"`: rgb and the depth (metres along the axis) it was seen at; empty where unused.
+    pub photo_albedo: Vec<[f32; 4]>,
+    /// One word a pixel: what the pilot found (see [`PixelInfo`]).
+    pub pixels: Vec<PixelInfo>,
+}

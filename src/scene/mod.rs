@@ -1,0 +1,346 @@
+//! The validated scene: world space, metres, f64 transforms, linear Rec.709 colours.
+//!
+//! [`load`] turns a scene file into a [`Scene`]; everything a file can get wrong is refused there, with file, line and column.
+//! What leaves this module is finite, in range and refers only to things that exist.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::DMat4;
+
+/// Which world a thing belongs to: the proxy of what the camera saw, or what was added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Side {
+    Real,
+    Virtual,
+}
+
+/// Everything a render needs, checked.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Name of the folder that holds the scene file; the default picture name.
+    pub name: String,
+    pub path: PathBuf,
+    pub photo: Option<Photo>,
+    pub camera: Camera,
+    pub lens: Lens,
+    pub environment: Option<Environment>,
+    pub lights: Vec<Light>,
+    pub objects: Vec<Object>,
+    pub settings: Settings,
+    /// Things worth telling the user that are not errors (dropped triangles, ignored gamma chunks).
+    pub warnings: Vec<String>,
+}
+
+/// The camera image, decoded to linear Rec.709, row-major from the top left.
+#[derive(Clone, Debug)]
+pub struct Photo {
+    pub width: u32,
+    pub height: u32,
+    pub linear: Vec<[f32; 3]>,
+    /// The encoded samples as read, so that untouched pixels are written back bit for bit.
+    pub encoded: EncodedPhoto,
+}
+
+#[derive(Clone, Debug)]
+pub enum EncodedPhoto {
+    /// sRGB, 8 bits a channel.
+    Srgb8(Vec<[u8; 3]>),
+    /// sRGB, 16 bits a channel.
+    Srgb16(Vec<[u16; 3]>),
+    /// Linear EXR or HDR: `Photo::linear` is the file's own content.
+    Linear,
+}
+
+/// Pinhole intrinsics with OpenCV distortion and a rigid pose.
+#[derive(Clone, Debug)]
+pub struct Camera {
+    pub width: u32,
+    pub height: u32,
+    /// Pixels.
+    pub fx: f64,
+    pub fy: f64,
+    /// Pixels, corner origin: the centre of the first pixel is (0.5, 0.5).
+    pub cx: f64,
+    pub cy: f64,
+    /// OpenCV k1 k2 p1 p2 k3, ideal to photograph coordinates.
+    pub distortion: [f64; 5],
+    /// Rigid; the camera looks along its -Z, +Y up.
+    pub world_from_camera: DMat4,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lens {
+    /// 0 is the pinhole.
+    pub aperture_radius_m: f64,
+    /// Along the view axis; infinity is legal.
+    pub focus_distance_m: f64,
+    pub aperture: Aperture,
+    pub blade_rotation_deg: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aperture {
+    Disc,
+    /// The 2012 paper's: half-width = aperture radius.
+    Square,
+    /// Regular polygon of at least 3 blades; the aperture radius is its circumradius.
+    Blades(u32),
+}
+
+#[derive(Clone, Debug)]
+pub struct Environment {
+    pub map: EnvironmentMap,
+    /// About +Y; at 0 the centre column looks along -Z, at 90 along -X.
+    pub rotation_deg: f64,
+    pub scale: f64,
+}
+
+#[derive(Clone, Debug)]
+pub enum EnvironmentMap {
+    Constant([f32; 3]),
+    LatLong {
+        width: u32,
+        height: u32,
+        texels: Arc<Vec<[f32; 3]>>,
+    },
+}
+
+#[derive(Clone, Debug)]
+pub struct Light {
+    pub kind: LightKind,
+    pub side: Side,
+}
+
+/// Positions and directions in world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// Intensity in W/sr a channel.
+    Point {
+        position: [f64; 3],
+        intensity: [f32; 3],
+    },
+    /// Half-angles from the axis: full intensity inside `inner_deg`, none outside `outer_deg`, smooth between (glTF's fall-off).
+    Spot {
+        position: [f64; 3],
+        direction: [f64; 3],
+        intensity: [f32; 3],
+        inner_deg: f64,
+        outer_deg: f64,
+    },
+    /// `direction` is the direction of travel, irradiance on a plane across it.
+    Directional {
+        direction: [f64; 3],
+        irradiance: [f32; 3],
+    },
+    /// Emits to the side of edge_u x edge_v; a black surface that rays can see.
+    Quad {
+        corner: [f64; 3],
+        edge_u: [f64; 3],
+        edge_v: [f64; 3],
+        radiance: [f32; 3],
+    },
+}
+
+/// One `[[real]]` or `[[virtual]]` entry: a set of placed primitives.
+#[derive(Clone, Debug)]
+pub struct Object {
+    pub name: String,
+    pub side: Side,
+    pub world_from_object: DMat4,
+    pub instances: Vec<Instance>,
+    /// Real rays that leave this proxy do not meet the real world closer than this. 0: off.
+    pub self_shadow_bias_m: f32,
+    /// The albedo is estimated from the photograph (real objects only); the materials' own colour is not used.
+    pub albedo_from_photo: bool,
+}
+
+#[derive(Clone, Debug)]
+pub struct Instance {
+    pub object_from_local: DMat4,
+    pub primitive: Arc<Primitive>,
+    pub material: Arc<Material>,
+}
+
+/// Indexed triangles in local space. Finite, no degenerate triangle. Attribute arrays are empty or as long as `positions`;
+/// `normals` is never empty. Primitives without `tangents` get them derived from uv at hit time.
+#[derive(Clone, Debug, Default)]
+pub struct Primitive {
+    /// "mesh name / primitive 0": for messages.
+    pub name: String,
+    pub positions: Vec<[f32; 3]>,
+    pub normals: Vec<[f32; 3]>,
+    /// xyz and handedness in w.
+    pub tangents: Vec<[f32; 4]>,
+    /// Two texture coordinate sets.
+    pub uvs: [Vec<[f32; 2]>; 2],
+    /// Linear, multiplies the base colour.
+    pub colors: Vec<[f32; 4]>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// glTF metallic-roughness with the extensions mixray knows. Factors as in glTF; colours linear.
+#[derive(Clone, Debug)]
+pub struct Material {
+    pub name: String,
+    pub base_color: [f32; 4],
+    pub base_color_texture: Option<TextureRef>,
+    pub metallic: f32,
+    /// Perceptual roughness; GGX alpha is its square.
+    pub roughness: f32,
+    /// G roughness, B metallic.
+    pub metallic_roughness_texture: Option<TextureRef>,
+    pub normal_texture: Option<TextureRef>,
+    pub normal_scale: f32,
+    /// Radiance, emissive strength included.
+    pub emissive: [f32; 3],
+    pub emissive_texture: Option<TextureRef>,
+    pub alpha_mode: AlphaMode,
+    pub double_sided: bool,
+    /// Emits its base colour and scatters nothing.
+    pub unlit: bool,
+    pub ior: f32,
+    pub specular: f32,
+    /// A channel.
+    pub specular_texture: Option<TextureRef>,
+    pub specular_color: [f32; 3],
+    /// RGB, sRGB encoded.
+    pub specular_color_texture: Option<TextureRef>,
+    pub transmission: f32,
+    /// R channel.
+    pub transmission_texture: Option<TextureRef>,
+    /// True: a sheet without inside (glTF thickness 0), light goes straight through; false: the mesh bounds a volume and refracts.
+    pub thin_walled: bool,
+    pub attenuation_color: [f32; 3],
+    /// Infinity: clear.
+    pub attenuation_distance_m: f32,
+    pub clearcoat: f32,
+    /// R channel.
+    pub clearcoat_texture: Option<TextureRef>,
+    pub clearcoat_roughness: f32,
+    /// G channel.
+    pub clearcoat_roughness_texture: Option<TextureRef>,
+    pub clearcoat_normal_texture: Option<TextureRef>,
+    pub clearcoat_normal_scale: f32,
+}
+
+impl Default for Material {
+    /// A white dielectric, fully rough: what a scene file's `material = {}` starts from.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color: [1.0; 4],
+            base_color_texture: None,
+            metallic: 0.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            emissive: [0.0; 3],
+            emissive_texture: None,
+            alpha_mode: AlphaMode::Opaque,
+            double_sided: true,
+            unlit: false,
+            ior: 1.5,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: [1.0; 3],
+            specular_color_texture: None,
+            transmission: 0.0,
+            transmission_texture: None,
+            thin_walled: false,
+            attenuation_color: [1.0; 3],
+            attenuation_distance_m: f32::INFINITY,
+            clearcoat: 0.0,
+            clearcoat_texture: None,
+            clearcoat_roughness: 0.0,
+            clearcoat_roughness_texture: None,
+            clearcoat_normal_texture: None,
+            clearcoat_normal_scale: 1.0,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AlphaMode {
+    Opaque,
+    /// Cut-off.
+    Mask(f32),
+    Blend,
+}
+
+#[derive(Clone, Debug)]
+pub struct TextureRef {
+    pub texture: Arc<Texture>,
+    /// 0 or 1.
+    pub uv_set: u32,
+    /// KHR_texture_transform as rows: u' = m[0]*u + m[1]*v + m[2], v' = m[3]*u + m[4]*v + m[5].
+    pub transform: [f32; 6],
+}
+
+#[derive(Clone, Debug)]
+pub struct Texture {
+    pub name: String,
+    pub width: u32,
+    pub height: u32,
+    /// As stored in the file; whether it is sRGB depends on the slot it is used in.
+    pub rgba8: Vec<[u8; 4]>,
+    pub wrap_u: Wrap,
+    pub wrap_v: Wrap,
+    /// Nearest instead of bilinear.
+    pub nearest: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wrap {
+    Repeat,
+    Mirror,
+    Clamp,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Estimator {
+    Direct,
+    Paper,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SamplerKind {
+    Jittered,
+    Cmj,
+    Sobol,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Composite {
+    Additive,
+    Quotient,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BackendChoice {
+    Auto,
+    Cpu,
+    Gpu,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Exposure {
+    /// Scene radiance times 2^ev.
+    Ev(f64),
+    /// Fits Ir to Ic over the proxy.
+    Auto,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    pub rays_per_pixel: u32,
+    /// Surface interactions before the light: 1 is direct light only.
+    pub max_bounces: u32,
+    pub seed: u32,
+    pub estimator: Estimator,
+    pub sampler: SamplerKind,
+    pub composite: Composite,
+    pub backend: BackendChoice,
+    pub exposure: Exposure,
+}
