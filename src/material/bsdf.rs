@@ -389,21 +389,25 @@ pub fn bsdf_sample(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
     if scatters_nothing(s) {
         return SAMPLE_NOTHING;
     }
-    if bsdf_is_lambertian(s) {
-        let wi = sample_lambert(s, u[1], u[2]);
-        let pdf = lambert_cos(s, wi) * INV_PI;
-        if !(pdf > 0.0) {
-            return SAMPLE_NOTHING;
-        }
-        return BsdfSample {
-            wi,
-            weight: s.base_color,
-            pdf,
-            delta: false,
-            transmitted: false,
-            valid: true,
-        };
+    if !bsdf_is_lambertian(s) {
+        return sample_layers(s, wo, u);
     }
+    let wi = sample_lambert(s, u[1], u[2]);
+    let pdf = lambert_cos(s, wi) * INV_PI;
+    if !(pdf > 0.0) {
+        return SAMPLE_NOTHING;
+    }
+    BsdfSample {
+        wi,
+        weight: s.base_color,
+        pdf,
+        delta: false,
+        transmitted: false,
+        valid: true,
+    }
+}
+
+fn sample_layers(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
     let lobes = lobes_at(s, wo);
     if !(lobes.sum > NO_ALBEDO) {
         return SAMPLE_NOTHING;
@@ -412,10 +416,14 @@ pub fn bsdf_sample(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
         return mixture_sample(s, &lobes, wo, sample_lambert(s, u[1], u[2]));
     }
     let rest = u[0] - lobes.p_diffuse;
-    if rest < lobes.p_interface || lobes.p_coat == 0.0 {
-        let choice = (rest / lobes.p_interface.max(1e-20)).min(LARGEST_BELOW_1);
-        return sample_interface(s, &lobes, wo, choice, u);
+    if !(rest < lobes.p_interface || lobes.p_coat == 0.0) {
+        return sample_coat(s, &lobes, wo, u);
     }
+    let choice = (rest / lobes.p_interface.max(1e-20)).min(LARGEST_BELOW_1);
+    sample_interface(s, &lobes, wo, choice, u)
+}
+
+fn sample_coat(s: &Surface, lobes: &Lobes, wo: Vec3, u: [f32; 3]) -> BsdfSample {
     if coat_delta(s) {
         let wi = on_side(s.ng, 1.0, reflected_about(s.coat_ns, wo));
         // coat / p_coat
@@ -424,7 +432,7 @@ pub fn bsdf_sample(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
     let h = ggx_sample_half(s.coat_alpha, s.coat_ns, wo, u[1], u[2]);
     let mirror = unit(reflected_about(h, wo));
     if s.coat_ns.dot(mirror) > 0.0 && s.ng.dot(mirror) > 0.0 {
-        mixture_sample(s, &lobes, wo, mirror)
+        mixture_sample(s, lobes, wo, mirror)
     } else {
         SAMPLE_NOTHING
     }

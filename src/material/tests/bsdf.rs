@@ -182,7 +182,7 @@ impl Bins {
             for azimuth in 0..AZIMUTHS {
                 let width = TAU / AZIMUTHS as f64;
                 let phi = [azimuth as f64 * width, (azimuth + 1) as f64 * width];
-                sums.push(settled_integral(&at, h, phi, 6e-6, 5));
+                sums.push(settled_integral(&at, h, phi, 3e-6, 6));
             }
         }
         sums
