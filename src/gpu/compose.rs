@@ -10,7 +10,10 @@ use super::GpuError;
 use crate::packed::{self, PackedScene};
 
 /// The embedded modules: name and source.
-pub const MODULES: &[(&str, &str)] = &[("bindings", include_str!("../../shaders/bindings.wgsl"))];
+pub const MODULES: &[(&str, &str)] = &[
+    ("bindings", include_str!("../../shaders/bindings.wgsl")),
+    ("trace", include_str!("../../shaders/trace.wgsl")),
+];
 
 macro_rules! features {
     ($($(#[$doc:meta])* $name:ident,)*) => {
