@@ -10,7 +10,12 @@ use super::GpuError;
 use crate::packed::{self, PackedScene};
 
 /// The embedded modules: name and source.
-pub const MODULES: &[(&str, &str)] = &[("bindings", include_str!("../../shaders/bindings.wgsl"))];
+pub const MODULES: &[(&str, &str)] = &[
+    ("bindings", include_str!("../../shaders/bindings.wgsl")),
+    ("film", include_str!("../../shaders/film.wgsl")),
+    ("kernels", include_str!("../../shaders/kernels.wgsl")),
+    ("lanes", include_str!("../../shaders/lanes.wgsl")),
+];
 
 macro_rules! features {
     ($($(#[$doc:meta])* $name:ident,)*) => {
