@@ -15,6 +15,10 @@ pub const MODULES: &[(&str, &str)] = &[
     ("film", include_str!("../../shaders/film.wgsl")),
     ("kernels", include_str!("../../shaders/kernels.wgsl")),
     ("lanes", include_str!("../../shaders/lanes.wgsl")),
+    ("lens", include_str!("../../shaders/lens.wgsl")),
+    ("math", include_str!("../../shaders/math.wgsl")),
+    ("sampler", include_str!("../../shaders/sampler.wgsl")),
+    ("trace", include_str!("../../shaders/trace.wgsl")),
 ];
 
 macro_rules! features {
