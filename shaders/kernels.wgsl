@@ -9,7 +9,7 @@ import package::lanes::{
     COUNT_IN, COUNT_OUT, COUNT_RAYS, COUNT_STEPS, RAY_KINDS, WORKGROUP,
 };
 import package::request::answer;
-import package::state::STAGE_DONE;
+import package::state::{FAR, STAGE_DONE};
 
 @compute @workgroup_size(64)
 fn kernel_generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
@@ -42,7 +42,13 @@ fn kernel_turn() {
 @compute @workgroup_size(64)
 fn kernel_trace(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     if id.x < atomicLoad(&counters[COUNT_IN]) {
-        answer(queue_in[id.x], thread);
+        let lane = queue_in[id.x];
+        var path = paths[lane];
+        answer(&path, thread);
+        // The rest of the state is as it was.
+        paths[lane].hit_real = path.hit_real;
+        paths[lane].hit_virtual = path.hit_virtual;
+        paths[lane].rays = path.rays;
     }
 }
 
@@ -102,7 +108,7 @@ fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(loca
                     sums = pixel_add(sums, index, is_virtual, radiance, zero);
                 }
                 let depth_m = paths[lane].depth_m;
-                if batch.with_guides != 0u && (bitcast<u32>(depth_m) & 0x7fffffffu) < 0x7f800000u {
+                if batch.with_guides != 0u && depth_m < FAR {
                     guide_sums[slot] = guide_add(guide_sums[slot], depth_m, paths[lane].normal, paths[lane].albedo, zero);
                 }
             }

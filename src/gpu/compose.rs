@@ -35,6 +35,16 @@ macro_rules! features {
                 vec![$((stringify!($name), self.$name),)*]
             }
 
+            /// With one flag the other way round; unchanged if there is none of that name.
+            #[must_use]
+            pub fn toggled(mut self, name: &str) -> Self {
+                match name {
+                    $(stringify!($name) => self.$name = !self.$name,)*
+                    _ => {}
+                }
+                self
+            }
+
             /// Everything on: the largest variant.
             pub fn all() -> Self {
                 Self { $($name: true,)* }

@@ -54,4 +54,6 @@ pub enum GpuError {
 #[cfg(test)]
 mod layout_test;
 #[cfg(test)]
+mod variants_test;
+#[cfg(test)]
 mod wavefront_test;

@@ -53,8 +53,12 @@ impl Pacer {
         }
     }
 
-    /// A submission of `lane_steps` steps took so long. A slow one counts at once, fast ones by and by.
-    pub fn record(&mut self, took: Duration, lane_steps: u64) {
+    /// A submission of `lane_steps` steps took so long. A slow one counts at once, fast ones by and by. Those that end a batch, when few
+    /// lanes are alive, say more about the cost of a dispatch than of a step; they count only where they take too long.
+    pub fn record(&mut self, took: Duration, lane_steps: u64, begins_batch: bool) {
+        if !begins_batch && took.as_secs_f64() < TARGET_SECS {
+            return;
+        }
         let measured = took.as_secs_f64() / lane_steps.max(1) as f64;
         self.secs_per_step = Some(match self.secs_per_step {
             Some(known) if measured < known => 0.5 * (known + measured),
@@ -75,7 +79,7 @@ mod tests {
             let lanes = pacer.lanes();
             let steps = pacer.steps(lanes);
             let secs = 1e-4 + secs_per_step * (lanes * steps) as f64;
-            pacer.record(Duration::from_secs_f64(secs), (lanes * steps) as u64);
+            pacer.record(Duration::from_secs_f64(secs), (lanes * steps) as u64, true);
             if batch >= 2 {
                 longest = longest.max(secs);
             }

@@ -12,8 +12,9 @@ use super::pacer::Pacer;
 use super::profile::{
     ACCUMULATE, ADVANCE, GENERATE, KERNELS, KernelSeconds, Profiler, TRACE, TURN,
 };
-use super::{Composer, Features, GpuDevice, GpuError, SceneBuffers};
+use super::{Composer, Features, GpuDevice, GpuError, SceneBuffers, SceneParts};
 use crate::film::Film;
+use crate::packed::PackedScene;
 
 /// Samples of one pixel in a batch at most, so that a batch has pixels enough to sum in parallel.
 const MOST_SAMPLES: u32 = 256;
@@ -50,6 +51,7 @@ impl PixelWork {
 pub struct GpuBackend {
     gpu: Arc<GpuDevice>,
     scene: SceneBuffers,
+    features: Features,
     kernels: Vec<Kernel>,
     /// Bytes of the state of one sample.
     path_bytes: u64,
@@ -72,6 +74,32 @@ struct Dispatch {
 }
 
 impl GpuBackend {
+    /// Uploads the scene and compiles kernels that do what it needs and no more.
+    ///
+    /// # Errors
+    /// [`GpuError::Limit`] if the scene does not fit the device.
+    pub fn new(gpu: Arc<GpuDevice>, scene: &PackedScene) -> Result<Self, GpuError> {
+        let buffers = SceneBuffers::from_parts(&gpu, &SceneParts::from(scene))?;
+        let features = Features::for_scene(scene);
+        Self::with_modules(gpu, &Composer::default(), &features, buffers)
+    }
+
+    /// Takes the scene as it is now; compiles again only if it needs other features than before.
+    ///
+    /// # Errors
+    /// As [`GpuBackend::new`].
+    pub fn set_scene(&mut self, scene: &PackedScene) -> Result<(), GpuError> {
+        let features = Features::for_scene(scene);
+        if features != self.features {
+            *self = Self::new(Arc::clone(&self.gpu), scene)?;
+            return Ok(());
+        }
+        self.scene = SceneBuffers::from_parts(&self.gpu, &SceneParts::from(scene))?;
+        // Bind groups name the old buffers.
+        self.lanes = None;
+        Ok(())
+    }
+
     /// Compiles the kernels for `features` from `composer`'s modules; `scene` is what they read.
     ///
     /// # Errors
@@ -98,6 +126,7 @@ impl GpuBackend {
         Ok(Self {
             gpu,
             scene,
+            features: *features,
             kernels,
             path_bytes,
             lanes: None,
@@ -295,7 +324,7 @@ impl GpuBackend {
             if self.warm {
                 let begun = if steps == 0 { batch.lane_count } else { 0 };
                 let done = u64::from(begun) + u64::from(counters.steps - steps_before);
-                self.pacer.record(start.elapsed(), done);
+                self.pacer.record(start.elapsed(), done, steps == 0);
             }
             self.warm = true;
             steps_before = counters.steps;

@@ -12,11 +12,12 @@ use crate::packed::Frame;
 
 const STATE: &str = "
 const STAGE_DONE: u32 = 0u;
+const FAR: f32 = 3.40282346638528859812e38;
 struct RayCounts { primary: u32, mixed: u32, real: u32, mixed_shadow: u32, real_shadow: u32 }
 struct PathState {
     pixel: u32, index: u32, stage: u32, word: u32,
-    radiance: vec3<f32>, mask: u32, radiance_real: vec3<f32>, depth_m: f32, normal: vec3<f32>, hit: u32, albedo: vec3<f32>,
-    rays: RayCounts,
+    radiance: vec3<f32>, mask: u32, radiance_real: vec3<f32>, depth_m: f32, normal: vec3<f32>, hit_real: u32,
+    albedo: vec3<f32>, hit_virtual: u32, rays: RayCounts,
 }";
 
 /// A walk that ends at each step with probability 1/8; what it 'hits' is a hash of where it is.
@@ -36,23 +37,25 @@ fn begin_sample(pixel: u32, index: u32, real_pass: bool) -> PathState {
     return path;
 }
 fn advance(path: ptr<function, PathState>) {
-    let x = f32((*path).hit >> 8u) / 16777216.0;
-    (*path).word = (*path).hit;
-    (*path).mask = (*path).hit & 1u;
+    let x = f32((*path).hit_real >> 8u) / 16777216.0;
+    (*path).word = (*path).hit_real;
+    (*path).mask = (*path).hit_real & 1u;
     (*path).radiance += vec3<f32>(x, 1.0 - x, x * 0.5);
     (*path).normal += vec3<f32>(x);
-    (*path).rays.mixed += 1u;
-    if (*path).hit % 8u == 0u { (*path).stage = STAGE_DONE; }
+    if (*path).hit_real % 8u == 0u { (*path).stage = STAGE_DONE; }
 }";
 
 const REQUEST: &str = "
-import package::lanes::paths;
+import package::state::PathState;
 import package::toy::mix_bits;
-fn answer(lane: u32, thread: u32) { paths[lane].hit = mix_bits(paths[lane].word ^ paths[lane].stage); }";
+fn answer(path: ptr<function, PathState>, thread: u32) {
+    (*path).hit_real = mix_bits((*path).word ^ (*path).stage);
+    (*path).rays.mixed += 1u;
+}";
 
 const TOY: &str = "fn mix_bits(word: u32) -> u32 { var x = word; x ^= x >> 16u; x *= 0x7feb352du; return x ^ (x >> 15u); }";
 
-fn composer() -> Composer {
+pub(super) fn composer() -> Composer {
     Composer::default()
         .with_module("state", STATE)
         .with_module("estimator", ESTIMATOR)
