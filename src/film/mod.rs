@@ -2,7 +2,6 @@
 
 mod accumulation;
 mod composite;
-pub mod srgb;
 mod sums;
 
 pub use accumulation::{Film, MergeError, PixelCounts, PixelKind};
@@ -11,3 +10,6 @@ pub use sums::{
     Guide, GuideSums, PixelSums, Sample, Sum3, guide_add, is_unusable, pixel_add, pixel_add_real,
     sum_add, sum3_add, two_sum,
 };
+
+/// The transfer function of the photograph, by which the composite is encoded again.
+pub use crate::scene::srgb;

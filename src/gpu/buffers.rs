@@ -3,9 +3,7 @@
 use bytemuck::Zeroable;
 
 use super::{GpuDevice, GpuError};
-use crate::packed::{
-    AliasEntry, Frame, Light, Material, PackedScene, PixelInfo, TextureRef, Triangle, Vertex,
-};
+use crate::packed::{Frame, Light, Material, PackedScene, PixelInfo, TextureRef, Triangle, Vertex};
 
 /// The arrays of a packed scene, any of them possibly empty; `From` a packed scene: all of them.
 #[derive(Clone, Copy)]
@@ -18,7 +16,7 @@ pub struct SceneParts<'a> {
     pub texels: &'a [u32],
     pub lights: &'a [Light],
     pub env_texels: &'a [f32],
-    pub env_alias: &'a [AliasEntry],
+    pub env_cdf: &'a [f32],
     pub photo_albedo: &'a [[f32; 4]],
     pub pixels: &'a [PixelInfo],
     /// Both worlds, the real one first.
@@ -37,7 +35,7 @@ impl Default for SceneParts<'_> {
             texels: &[],
             lights: &[],
             env_texels: &[],
-            env_alias: &[],
+            env_cdf: &[],
             photo_albedo: &[],
             pixels: &[],
             bvh_nodes: [&[], &[]],
@@ -58,7 +56,7 @@ impl<'a> From<&'a PackedScene> for SceneParts<'a> {
             texels: &scene.texels,
             lights: &scene.lights,
             env_texels: &scene.env_texels,
-            env_alias: &scene.env_alias,
+            env_cdf: &scene.env_cdf,
             photo_albedo: &scene.photo_albedo,
             pixels: &scene.pixels,
             bvh_nodes: worlds.map(|bvh| bytemuck::cast_slice(bvh.gpu_nodes())),
@@ -89,7 +87,7 @@ impl SceneBuffers {
             ("texels", one(parts.texels)),
             ("lights", one(parts.lights)),
             ("environment map", one(parts.env_texels)),
-            ("environment table", one(parts.env_alias)),
+            ("environment table", one(parts.env_cdf)),
             ("albedo of the photograph", one(parts.photo_albedo)),
             ("pixels", one(parts.pixels)),
             ("BVH nodes", [real_nodes, virtual_nodes]),
