@@ -131,7 +131,9 @@ const SUBDIVISION: usize = 12;
 impl Bins {
     /// Over the whole sphere; the horizon of `axis` is an edge.
     fn sphere(axis: Vec3) -> Self {
-        let edges = (0..=48).map(|i| PI * f64::from(i) / 48.0).collect();
+        let edges = (0..=48)
+            .map(|i| PI * f64::from(i) / 48.0)
+            .collect();
         Self { axis, edges }
     }
 
@@ -678,10 +680,7 @@ fn scattering_is_reciprocal() {
             }
             checked += 1;
             let error = (forward - backward).abs().max_element();
-            assert!(
-                error < 2e-3 * forward.max_element() + 1e-6,
-                "{s:?} {wo} {wi} {forward} {backward}"
-            );
+            assert!(error < 2e-3 * forward.max_element() + 1e-6, "{s:?} {wo} {wi} {forward} {backward}");
         }
     }
     assert!(checked > 20_000);
