@@ -12,19 +12,25 @@ use crate::packed::{self, PackedScene};
 /// The embedded modules: name and source.
 pub const MODULES: &[(&str, &str)] = &[
     ("bindings", include_str!("../../shaders/bindings.wgsl")),
+    ("bsdf", include_str!("../../shaders/bsdf.wgsl")),
     (
         "contribution",
         include_str!("../../shaders/contribution.wgsl"),
     ),
     ("estimator", include_str!("../../shaders/estimator.wgsl")),
     ("film", include_str!("../../shaders/film.wgsl")),
+    ("fresnel", include_str!("../../shaders/fresnel.wgsl")),
+    ("ggx", include_str!("../../shaders/ggx.wgsl")),
     ("kernels", include_str!("../../shaders/kernels.wgsl")),
     ("lanes", include_str!("../../shaders/lanes.wgsl")),
     ("lens", include_str!("../../shaders/lens.wgsl")),
     ("math", include_str!("../../shaders/math.wgsl")),
+    ("normal", include_str!("../../shaders/normal.wgsl")),
     ("request", include_str!("../../shaders/request.wgsl")),
     ("sampler", include_str!("../../shaders/sampler.wgsl")),
     ("state", include_str!("../../shaders/state.wgsl")),
+    ("surface", include_str!("../../shaders/surface.wgsl")),
+    ("texture", include_str!("../../shaders/texture.wgsl")),
     ("trace", include_str!("../../shaders/trace.wgsl")),
     ("vertex", include_str!("../../shaders/vertex.wgsl")),
 ];

@@ -2,6 +2,7 @@ mod bsdf;
 mod fresnel;
 mod surface;
 mod texture;
+mod twins;
 
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
@@ -114,7 +115,7 @@ pub fn one_triangle(corners: [[f32; 3]; 3], material: Material) -> PackedScene {
         texels: Vec::new(),
         lights: Vec::new(),
         env_texels: Vec::new(),
-        env_alias: Vec::new(),
+        env_cdf: Vec::new(),
         photo_albedo: Vec::new(),
         pixels: Vec::new(),
     }
