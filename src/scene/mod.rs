@@ -3,6 +3,8 @@
 //! [`load`] turns a scene file into a [`Scene`]; everything a file can get wrong is refused there, with file, line and column.
 //! What leaves this module is finite, in range and refers only to things that exist.
 
+pub mod gltf;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -1,0 +1,286 @@
+//! Choosing and opening a graphics device, noticing its loss, reading buffers back.
+
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::GpuError;
+
+/// A submission that has not ended by then never will: a fraction of a second is the rule, shader compilation on a software device
+/// the exception.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// Which devices are acceptable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AdapterChoice {
+    /// A real GPU; what `--backend auto` looks for.
+    Hardware,
+    /// A real GPU if there is one, else a software device; what `--backend gpu` takes.
+    Any,
+}
+
+/// An opened device with its queue.
+pub struct GpuDevice {
+    pub device: wgpu::Device,
+    pub queue: wgpu::Queue,
+    pub info: wgpu::AdapterInfo,
+    /// What was asked for and granted.
+    pub limits: wgpu::Limits,
+    /// GPU timestamps can be taken.
+    pub timestamps: bool,
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+/// One line of `mixray info`: an adapter and the limits that matter here.
+#[derive(Clone, Debug, Serialize)]
+pub struct AdapterReport {
+    pub name: String,
+    /// vulkan, metal, dx12.
+    pub backend: String,
+    /// discrete GPU, integrated GPU, virtual GPU, CPU, other.
+    pub kind: String,
+    pub driver: String,
+    /// `--backend auto` would take it.
+    pub hardware: bool,
+    /// The largest array a kernel can read, bytes.
+    pub max_storage_binding_bytes: u64,
+    pub max_buffer_bytes: u64,
+    /// Arrays a kernel can read.
+    pub max_storage_buffers: u32,
+    pub max_workgroup_memory_bytes: u32,
+    pub max_workgroup_invocations: u32,
+    pub timestamps: bool,
+}
+
+fn instance() -> wgpu::Instance {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    // Indirect arguments are written by our own kernel, which clamps them; wgpu's check would cost a pass before every dispatch.
+    descriptor
+        .flags
+        .remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
+    wgpu::Instance::new(descriptor)
+}
+
+fn adapters() -> Vec<wgpu::Adapter> {
+    pollster::block_on(instance().enumerate_adapters(wgpu::Backends::all()))
+}
+
+fn is_hardware(kind: wgpu::DeviceType) -> bool {
+    matches!(
+        kind,
+        wgpu::DeviceType::DiscreteGpu
+            | wgpu::DeviceType::IntegratedGpu
+            | wgpu::DeviceType::VirtualGpu
+    )
+}
+
+/// Lower is better.
+fn rank(kind: wgpu::DeviceType) -> u32 {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    }
+}
+
+fn kind_name(kind: wgpu::DeviceType) -> &'static str {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+        wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+        wgpu::DeviceType::VirtualGpu => "virtual GPU",
+        wgpu::DeviceType::Cpu => "CPU",
+        wgpu::DeviceType::Other => "other",
+    }
+}
+
+/// Every adapter of this machine, best first.
+pub fn list_adapters() -> Vec<AdapterReport> {
+    let mut adapters = adapters();
+    adapters.sort_by_key(|adapter| rank(adapter.get_info().device_type));
+    adapters
+        .iter()
+        .map(|adapter| {
+            let info = adapter.get_info();
+            let limits = adapter.limits();
+            AdapterReport {
+                name: info.name,
+                backend: info.backend.to_string(),
+                kind: kind_name(info.device_type).to_owned(),
+                driver: format!("{} {}", info.driver, info.driver_info)
+                    .trim()
+                    .to_owned(),
+                hardware: is_hardware(info.device_type),
+                max_storage_binding_bytes: limits.max_storage_buffer_binding_size,
+                max_buffer_bytes: limits.max_buffer_size,
+                max_storage_buffers: limits.max_storage_buffers_per_shader_stage,
+                max_workgroup_memory_bytes: limits.max_compute_workgroup_storage_size,
+                max_workgroup_invocations: limits.max_compute_invocations_per_workgroup,
+                timestamps: adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY),
+            }
+        })
+        .collect()
+}
+
+impl GpuDevice {
+    /// Opens the best adapter that `choice` allows.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] says what was found instead; [`GpuError::Open`] if the driver refuses.
+    pub fn open(choice: AdapterChoice) -> Result<Self, GpuError> {
+        let found = adapters();
+        let best = found
+            .iter()
+            .filter(|adapter| {
+                choice == AdapterChoice::Any || is_hardware(adapter.get_info().device_type)
+            })
+            .min_by_key(|adapter| rank(adapter.get_info().device_type));
+        let Some(adapter) = best else {
+            return Err(GpuError::NoAdapter(if found.is_empty() {
+                "no Vulkan, Metal or DirectX 12 driver answers".to_owned()
+            } else {
+                let names: Vec<String> = found
+                    .iter()
+                    .map(|adapter| adapter.get_info().name)
+                    .collect();
+                format!("only software devices ({})", names.join(", "))
+            }));
+        };
+        Self::open_adapter(adapter)
+    }
+
+    fn open_adapter(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+        let info = adapter.get_info();
+        let offered = adapter.limits();
+        let limits = wgpu::Limits {
+            max_storage_buffers_per_shader_stage: offered.max_storage_buffers_per_shader_stage,
+            max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
+            max_buffer_size: offered.max_buffer_size,
+            max_uniform_buffer_binding_size: offered.max_uniform_buffer_binding_size,
+            max_compute_workgroup_storage_size: offered.max_compute_workgroup_storage_size,
+            max_compute_invocations_per_workgroup: offered.max_compute_invocations_per_workgroup,
+            max_compute_workgroup_size_x: offered.max_compute_workgroup_size_x,
+            max_compute_workgroup_size_y: offered.max_compute_workgroup_size_y,
+            max_compute_workgroup_size_z: offered.max_compute_workgroup_size_z,
+            max_compute_workgroups_per_dimension: offered.max_compute_workgroups_per_dimension,
+            ..wgpu::Limits::downlevel_defaults()
+        };
+        let timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("mixray"),
+            required_features: if timestamps {
+                wgpu::Features::TIMESTAMP_QUERY
+            } else {
+                wgpu::Features::empty()
+            },
+            required_limits: limits.clone(),
+            ..Default::default()
+        }))
+        .map_err(|error| GpuError::Open {
+            adapter: info.name.clone(),
+            reason: error.to_string(),
+        })?;
+
+        let fault = Arc::new(Mutex::new(None));
+        let lost = Arc::clone(&fault);
+        device.set_device_lost_callback(move |reason, message| {
+            note(&lost, format!("{reason:?}: {message}"));
+        });
+        let refused = Arc::clone(&fault);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            note(&refused, error.to_string());
+        }));
+        Ok(Self {
+            device,
+            queue,
+            info,
+            limits,
+            timestamps,
+            fault,
+        })
+    }
+
+    /// "NVIDIA H100 (vulkan)".
+    pub fn name(&self) -> String {
+        format!("{} ({})", self.info.name, self.info.backend)
+    }
+
+    /// # Errors
+    /// [`GpuError::Lost`] once the device is gone or has refused a command.
+    pub fn check(&self) -> Result<(), GpuError> {
+        match &*self.fault.lock().unwrap_or_else(PoisonError::into_inner) {
+            Some(message) => Err(GpuError::Lost(message.clone())),
+            None => Ok(()),
+        }
+    }
+
+    /// Submits and waits for the end.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn submit_and_wait(&self, encoder: wgpu::CommandEncoder) -> Result<(), GpuError> {
+        let index = self.queue.submit([encoder.finish()]);
+        self.wait(Some(index))
+    }
+
+    fn wait(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), GpuError> {
+        let outcome = self.device.poll(wgpu::PollType::Wait {
+            submission_index,
+            timeout: Some(PATIENCE),
+        });
+        self.check()?;
+        outcome
+            .map(|_| ())
+            .map_err(|error| GpuError::Lost(error.to_string()))
+    }
+
+    /// Bytes of a buffer made with MAP_READ, once everything submitted has ended.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn read(&self, staging: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>, GpuError> {
+        let slice = staging.slice(..bytes);
+        let (sender, receiver) = mpsc::channel();
+        slice.map_async(wgpu::MapMode::Read, move |result| {
+            // The receiver outlives the poll below; if it does not, nobody waits for the answer.
+            let _ = sender.send(result);
+        });
+        self.wait(None)?;
+        let lost = |message: String| GpuError::Lost(message);
+        receiver
+            .try_recv()
+            .map_err(|_| lost("a buffer was not handed back".to_owned()))?
+            .map_err(|error| lost(error.to_string()))?;
+        let data = slice
+            .get_mapped_range()
+            .map_err(|error| lost(error.to_string()))?
+            .to_vec();
+        staging.unmap();
+        Ok(data)
+    }
+
+    /// Runs `make` and turns what the driver objects to into an error.
+    pub(super) fn catching<T>(&self, make: impl FnOnce() -> T) -> Result<T, wgpu::Error> {
+        let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
+        let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let made = make();
+        let errors = [
+            pollster::block_on(validation.pop()),
+            pollster::block_on(internal.pop()),
+            pollster::block_on(memory.pop()),
+        ];
+        match errors.into_iter().flatten().next() {
+            Some(error) => Err(error),
+            None => Ok(made),
+        }
+    }
+}
+
+/// Keeps the first fault: later ones follow from it.
+fn note(fault: &Mutex<Option<String>>, message: String) {
+    let mut fault = fault.lock().unwrap_or_else(PoisonError::into_inner);
+    fault.get_or_insert(message);
+}

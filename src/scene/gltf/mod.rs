@@ -1,0 +1,504 @@
+//! glTF 2.0 (.gltf, .glb) to placed primitives, materials and lights.
+//!
+//! The typed model is that of the `gltf` crate; its accessor and import code, which can panic on malformed files, is not used.
+//! Every index, offset and length is checked here before it is followed, so a broken file is an error and never a panic.
+//!
+//! Only what the drawn scene reaches is read: a damaged image that nothing shows does no harm. Drawn are the nodes of the
+//! default scene, or of the first scene where no default is named, or all root nodes where there is no scene. Animations, skins
+//! and morph targets are not applied; occlusion textures are not read, because the light transport computes what they fake.
+
+mod container;
+mod document;
+mod image;
+mod material;
+mod mesh;
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use glam::{DMat4, DQuat, DVec3};
+use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
+use gltf::json::validation::Checked;
+
+use super::Instance;
+use container::malformed;
+use document::{Document, Node};
+
+/// What a glTF file brings into an object.
+#[derive(Clone, Debug, Default)]
+pub struct GltfScene {
+    /// A mesh that several nodes draw is shared.
+    pub instances: Vec<Instance>,
+    pub lights: Vec<PlacedLight>,
+    /// At least one drawn primitive names a material of its own; the others have glTF's default (white rough metal).
+    pub has_materials: bool,
+    pub warnings: Vec<String>,
+}
+
+/// A light of KHR_lights_punctual. It sits at the origin of its space and shines along -Z; scale has no effect on its strength.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedLight {
+    pub object_from_light: DMat4,
+    pub kind: PunctualLight,
+}
+
+/// The file's candela and lux are taken as W/sr and W/m^2, number for number: glTF names no luminous efficacy, and the
+/// photograph's exposure sets the scale anyway. `range` is not applied: it is a hint for rasterisers, and light has no end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PunctualLight {
+    /// W/sr.
+    Point { intensity: [f32; 3] },
+    /// W/sr; half-angles from the axis in degrees, `0 <= inner < outer <= 90`.
+    Spot {
+        intensity: [f32; 3],
+        inner_deg: f64,
+        outer_deg: f64,
+    },
+    /// W/m^2 on a plane across the light.
+    Directional { irradiance: [f32; 3] },
+}
+
+/// A glTF file that cannot be read; the message is one line and names the file and the place in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GltfError {
+    pub path: PathBuf,
+    pub problem: Problem,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Problem {
+    #[error("cannot be read: {0}")]
+    Unreadable(String),
+    /// `at` is a place such as `accessors[3]` or a mesh's name.
+    #[error("{at}: {reason}")]
+    Malformed { at: String, reason: String },
+    #[error("needs the glTF extension {name}, which mixray does not read{advice}")]
+    Extension { name: String, advice: String },
+}
+
+impl Problem {
+    fn extension(name: &str) -> Self {
+        let advice = match name {
+            "KHR_draco_mesh_compression"
+            | "EXT_meshopt_compression"
+            | "KHR_meshopt_compression" => {
+                "; convert the file with `npx @gltf-transform/cli copy IN.glb OUT.glb`, which writes the mesh uncompressed"
+            }
+            "KHR_texture_basisu" => {
+                "; convert the textures to PNG, for example with `npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb`"
+            }
+            "KHR_materials_pbrSpecularGlossiness" => {
+                "; convert the file with `npx @gltf-transform/cli metalrough IN.glb OUT.glb`"
+            }
+            "EXT_texture_avif" => {
+                "; convert the textures with `npx @gltf-transform/cli png IN.glb OUT.glb`"
+            }
+            _ => "; export the model again without it",
+        };
+        Self::Extension {
+            name: container::clip(name),
+            advice: advice.into(),
+        }
+    }
+}
+
+impl fmt::Display for GltfError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let line = format!("{}: {}", self.path.display(), self.problem);
+        // Names come from the file and may hold line ends or terminal codes.
+        let clean: String = line
+            .chars()
+            .map(|c| if c.is_control() { ' ' } else { c })
+            .collect();
+        f.write_str(&clean)
+    }
+}
+
+impl std::error::Error for GltfError {}
+
+/// Extensions that a file may require. Variants: the default material is what a file shows before anyone picks one.
+const SUPPORTED_EXTENSIONS: &[&str] = &[
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+/// Extensions that are dealt with where they occur: the mesh is either there uncompressed, or it is an error.
+const COMPRESSION_EXTENSIONS: &[&str] = &[
+    "EXT_meshopt_compression",
+    "KHR_draco_mesh_compression",
+    "KHR_meshopt_compression",
+];
+
+/// Reads a .gltf or .glb file, with its external and embedded buffers and images.
+///
+/// The geometry is finite, indexed in range and free of degenerate triangles; a triangle may still collapse when a transform is
+/// applied and rounded. Instances whose transform cannot be inverted are left out with a warning.
+///
+/// # Errors
+/// A [`GltfError`] of one line where the file is unreadable or broken, refers to something that does not exist, holds a
+/// number that is not finite, or needs an extension that mixray does not have (with the way to convert it).
+pub fn load_gltf(path: &Path) -> Result<GltfScene, GltfError> {
+    load(path).map_err(|problem| GltfError {
+        path: path.to_path_buf(),
+        problem,
+    })
+}
+
+fn load(path: &Path) -> Result<GltfScene, Problem> {
+    let container = container::read_container(path)?;
+    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    let document = Document::new(container, folder)?;
+    let mut notes = Notes::default();
+    check_extensions(&document, &mut notes)?;
+
+    let mut meshes = mesh::Meshes::new(&document);
+    let mut materials = material::Materials::new(&document);
+    let mut scene = GltfScene::default();
+    for (index, object_from_node) in placed_nodes(&document, &mut notes)? {
+        let node = &document.nodes[index];
+        if let Some(placed) = &node.extensions.light {
+            scene
+                .lights
+                .push(place_light(&document, placed.light, object_from_node)?);
+        }
+        let Some(mesh) = node.mesh else { continue };
+        let inverse = object_from_node.inverse();
+        if object_from_node.determinant() == 0.0 || !inverse.is_finite() {
+            notes.add(Note::Collapsed, 1, &format!("nodes[{index}]"));
+            continue;
+        }
+        if node.skin.is_some() {
+            notes.add(Note::Skinned, 1, &format!("nodes[{index}]"));
+        }
+        if is_morphed(&document, node, mesh) {
+            notes.add(Note::MorphTargets, 1, &format!("nodes[{index}]"));
+        }
+        for drawn in meshes.get(mesh, &format!("nodes[{index}]"), &mut notes)? {
+            let material = materials.get(drawn.material, &drawn.primitive, &mut notes)?;
+            scene.has_materials |= drawn.material.is_some();
+            scene.instances.push(Instance {
+                object_from_local: object_from_node,
+                primitive: drawn.primitive.clone(),
+                material,
+            });
+        }
+    }
+    if scene.instances.is_empty() && scene.lights.is_empty() {
+        notes.plain("the file draws nothing".into());
+    }
+    scene.warnings = notes.lines(path);
+    Ok(scene)
+}
+
+/// Whether morph targets have a part in the rest pose; a node's weights go before its mesh's.
+fn is_morphed(document: &Document, node: &Node, mesh: usize) -> bool {
+    let of_mesh = || document.meshes.get(mesh)?.weights.clone();
+    let weights = node.weights.clone().or_else(of_mesh).unwrap_or_default();
+    weights.iter().any(|weight| *weight != 0.0)
+}
+
+fn check_extensions(document: &Document, notes: &mut Notes) -> Result<(), Problem> {
+    for name in &document.extensions_required {
+        if !SUPPORTED_EXTENSIONS.contains(&name.as_str()) {
+            return Err(Problem::extension(name));
+        }
+    }
+    for name in &document.extensions_used {
+        let known = SUPPORTED_EXTENSIONS.contains(&name.as_str())
+            || COMPRESSION_EXTENSIONS.contains(&name.as_str());
+        if !known {
+            notes.plain(format!(
+                "the extension {} is not supported and was ignored",
+                container::clip(name)
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The nodes to draw, with their transforms to the file's space, in file order of a depth-first walk.
+fn placed_nodes(document: &Document, notes: &mut Notes) -> Result<Vec<(usize, DMat4)>, Problem> {
+    let count = document.nodes.len();
+    let mut parents = vec![None; count];
+    for (index, node) in document.nodes.iter().enumerate() {
+        for &child in &node.children {
+            let slot = parents
+                .get_mut(child)
+                .ok_or_else(|| no_such_node(&format!("nodes[{index}]"), child, count))?;
+            // The node graph must be a forest (glTF 2.0 section 3.5.3). Besides a cycle, this rules out diamonds, by which a
+            // file of n nodes can ask for 2^n instances.
+            if slot.replace(index).is_some() {
+                return Err(malformed(
+                    format!("nodes[{child}]"),
+                    "has two parents; the nodes of a glTF file form a tree",
+                ));
+            }
+        }
+    }
+    let roots = (0..count).filter(|&node| parents[node].is_none()).collect();
+    let reachable = walk(document, roots)?;
+    if reachable.len() < count {
+        return Err(malformed(
+            format!("nodes[{}]", node_on_cycle(&parents, &reachable)),
+            "is its own ancestor; the nodes of a glTF file form a tree",
+        ));
+    }
+    let roots = match (document.scene, document.scenes.first()) {
+        (Some(scene), _) => {
+            let scenes = document.scenes.len();
+            let nodes = document.scenes.get(scene).ok_or_else(|| {
+                malformed(
+                    "scene",
+                    format!("refers to scene {scene}; there are {scenes}"),
+                )
+            })?;
+            nodes.nodes.clone()
+        }
+        (None, Some(first)) => {
+            if document.scenes.len() > 1 {
+                notes.plain(
+                    "no default scene is named; the first of several scenes is shown".into(),
+                );
+            }
+            first.nodes.clone()
+        }
+        (None, None) => return Ok(reachable),
+    };
+    if let Some(&node) = roots.iter().find(|&&node| node >= count) {
+        return Err(no_such_node("scenes", node, count));
+    }
+    walk(document, roots)
+}
+
+/// Where every node has at most one parent, whatever no root reaches is on a cycle or hangs from one: upwards leads onto it.
+fn node_on_cycle(parents: &[Option<usize>], reachable: &[(usize, DMat4)]) -> usize {
+    let mut reached = vec![false; parents.len()];
+    for &(node, _) in reachable {
+        reached[node] = true;
+    }
+    let mut node = reached.iter().position(|reached| !reached).unwrap_or(0);
+    for _ in 0..parents.len() {
+        node = parents[node].unwrap_or(node);
+    }
+    node
+}
+
+fn no_such_node(at: &str, node: usize, count: usize) -> Problem {
+    malformed(at, format!("refers to node {node}; there are {count}"))
+}
+
+/// Depth first from `roots`, whose indices exist; stops with an error at a node that is met twice.
+fn walk(document: &Document, roots: Vec<usize>) -> Result<Vec<(usize, DMat4)>, Problem> {
+    let mut seen = vec![false; document.nodes.len()];
+    let mut placed = Vec::new();
+    let mut stack: Vec<(usize, DMat4)> = roots
+        .into_iter()
+        .rev()
+        .map(|root| (root, DMat4::IDENTITY))
+        .collect();
+    while let Some((index, parent)) = stack.pop() {
+        if std::mem::replace(&mut seen[index], true) {
+            return Err(malformed(
+                format!("nodes[{index}]"),
+                "is reached twice from the scene",
+            ));
+        }
+        let node = &document.nodes[index];
+        let transform = parent * local_transform(node, index)?;
+        if !transform.is_finite() {
+            return Err(malformed(
+                format!("nodes[{index}]"),
+                "its transform, composed with its parents', is not finite",
+            ));
+        }
+        placed.push((index, transform));
+        stack.extend(node.children.iter().rev().map(|&child| (child, transform)));
+    }
+    Ok(placed)
+}
+
+fn local_transform(node: &Node, index: usize) -> Result<DMat4, Problem> {
+    let bad = |reason: &str| malformed(format!("nodes[{index}]"), reason);
+    let matrix = match node.matrix {
+        Some(columns) => {
+            let matrix = DMat4::from_cols_array(&columns);
+            if (matrix.row(3) - glam::DVec4::W).abs().max_element() > 1e-6 {
+                return Err(bad(
+                    "its matrix is not affine; expected 0 0 0 1 as the last row",
+                ));
+            }
+            matrix
+        }
+        None => {
+            let rotation = DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+            if rotation.length() < 1e-6 || !rotation.is_finite() {
+                return Err(bad(
+                    "its rotation is not a quaternion that can be normalised",
+                ));
+            }
+            DMat4::from_scale_rotation_translation(
+                DVec3::from_array(node.scale.unwrap_or([1.0; 3])),
+                rotation.normalize(),
+                DVec3::from_array(node.translation.unwrap_or([0.0; 3])),
+            )
+        }
+    };
+    if matrix.is_finite() {
+        Ok(matrix)
+    } else {
+        Err(bad("its transform is not finite"))
+    }
+}
+
+fn place_light(
+    document: &Document,
+    index: usize,
+    object_from_light: DMat4,
+) -> Result<PlacedLight, Problem> {
+    let at = format!("KHR_lights_punctual lights[{index}]");
+    let light = document.lights.get(index).ok_or_else(|| {
+        malformed(
+            &at,
+            format!("does not exist; there are {}", document.lights.len()),
+        )
+    })?;
+    let strength = light.color.map(|channel| channel * light.intensity);
+    if !strength.iter().all(|s| s.is_finite() && *s >= 0.0) {
+        return Err(malformed(
+            &at,
+            "its color times intensity is negative or not finite",
+        ));
+    }
+    let kind = match (light.type_, &light.spot) {
+        (Checked::Valid(LightType::Point), _) => PunctualLight::Point {
+            intensity: strength,
+        },
+        (Checked::Valid(LightType::Directional), _) => PunctualLight::Directional {
+            irradiance: strength,
+        },
+        (Checked::Valid(LightType::Spot), Some(spot)) => {
+            let inner_deg = f64::from(spot.inner_cone_angle).to_degrees();
+            // The f32 nearest to pi/2 lies above it.
+            let outer_deg = f64::from(spot.outer_cone_angle).to_degrees().min(90.0);
+            let too_wide = spot.outer_cone_angle > 1.5708;
+            if !(inner_deg >= 0.0 && inner_deg < outer_deg) || too_wide {
+                return Err(malformed(
+                    &at,
+                    "its cone angles are not 0 <= inner < outer <= pi/2",
+                ));
+            }
+            PunctualLight::Spot {
+                intensity: strength,
+                inner_deg,
+                outer_deg,
+            }
+        }
+        (Checked::Valid(LightType::Spot), None) => {
+            return Err(malformed(&at, "a spot without its `spot` object"));
+        }
+        (Checked::Invalid, _) => {
+            return Err(malformed(&at, "its type is not point, spot or directional"));
+        }
+    };
+    Ok(PlacedLight {
+        object_from_light,
+        kind,
+    })
+}
+
+/// Things worth a warning that may occur a thousand times in one file: each kind becomes one line.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Note {
+    Degenerate,
+    NotTriangles,
+    Incomplete,
+    ZeroNormals,
+    BadTangents,
+    MorphTargets,
+    Skinned,
+    Collapsed,
+    MissingUv,
+    EmptyTexture,
+    Clamped,
+}
+
+#[derive(Default)]
+struct Notes {
+    counted: BTreeMap<Note, (u64, u64, String)>,
+    plain: Vec<String>,
+}
+
+impl Notes {
+    /// `count` occurrences at one more place.
+    fn add(&mut self, note: Note, count: u64, place: &str) {
+        let entry = self
+            .counted
+            .entry(note)
+            .or_insert_with(|| (0, 0, place.to_string()));
+        entry.0 += count;
+        entry.1 += 1;
+    }
+
+    fn plain(&mut self, line: String) {
+        if !self.plain.contains(&line) {
+            self.plain.push(line);
+        }
+    }
+
+    fn lines(self, path: &Path) -> Vec<String> {
+        let counted = self
+            .counted
+            .into_iter()
+            .map(|(note, (count, places, first))| {
+                let place = match places {
+                    1 => first,
+                    _ => format!("{first} and {} more", places - 1),
+                };
+                match note {
+                    Note::Degenerate => format!("dropped {count} degenerate triangles in {place}"),
+                    Note::NotTriangles => {
+                        format!("points and lines are not drawn: left out {place}")
+                    }
+                    Note::Incomplete => {
+                        format!("left out {count} indices that complete no triangle in {place}")
+                    }
+                    Note::ZeroNormals => {
+                        format!("replaced {count} zero normals by the faces' in {place}")
+                    }
+                    Note::BadTangents => {
+                        format!("derived tangents from the texture coordinates instead of unusable ones in {place}")
+                    }
+                    Note::MorphTargets => format!("morph targets are not applied, the base shape is shown: {place}"),
+                    Note::Skinned => format!("skins are not applied, the rest pose is shown: {place}"),
+                    Note::Collapsed => {
+                        format!("left out what a transform flattens to nothing: {place}")
+                    }
+                    Note::MissingUv => {
+                        format!("a texture refers to texture coordinates that the mesh lacks; they are taken as 0: {place}")
+                    }
+                    Note::EmptyTexture => format!("a texture without an image was ignored: {place}"),
+                    Note::Clamped => format!("clamped {count} material factors to their range in {place}"),
+                }
+            });
+        counted
+            .chain(self.plain)
+            .map(|line| {
+                let line = format!("{}: {line}", path.display());
+                line.chars()
+                    .map(|c| if c.is_control() { ' ' } else { c })
+                    .collect()
+            })
+            .collect()
+    }
+}
