@@ -1,0 +1,62 @@
+//! `[photo]`: the camera image and the exposure that ties the scene to it.
+
+use super::error::Result;
+use super::image_file::{Pixels, read_image};
+use super::reader::{Node, Table};
+use super::srgb::{decode_srgb8, decode_srgb16};
+use super::{EncodedPhoto, Exposure, Photo};
+
+const KEYS: &[&str] = &["image", "exposure_ev"];
+
+pub(super) fn read_photo(
+    root: &Table,
+    warnings: &mut Vec<String>,
+) -> Result<(Option<Photo>, Exposure)> {
+    let Some(table) = root.table("photo", "[photo]", KEYS)? else {
+        return Ok((None, Exposure::Ev(0.0)));
+    };
+    let photo = table.optional("image", |node| read_photo_image(node, warnings))?;
+    let exposure = table.optional("exposure_ev", |node| read_exposure(node, photo.is_some()))?;
+    Ok((photo, exposure.unwrap_or(Exposure::Ev(0.0))))
+}
+
+fn read_exposure(node: &Node, has_photo: bool) -> Result<Exposure> {
+    if !node.is_string() {
+        let expected = "a number from -64 to 64, or \"auto\"";
+        return Ok(Exposure::Ev(node.number(expected, |ev| ev.abs() <= 64.0)?));
+    }
+    if node.string()? != "auto" {
+        return Err(node.impossible("a number, or \"auto\""));
+    }
+    if !has_photo {
+        return Err(node.error(
+            "`exposure_ev` is \"auto\" without a photograph",
+            "`image` beside it",
+            "add the photograph or give a number",
+        ));
+    }
+    Ok(Exposure::Auto)
+}
+
+fn read_photo_image(node: &Node, warnings: &mut Vec<String>) -> Result<Photo> {
+    let path = node.existing_file()?;
+    let image = read_image(&path).map_err(|problem| node.file_error(&path, &problem))?;
+    warnings.extend(node.file_warnings(image.warnings));
+    let (linear, encoded) = match image.pixels {
+        Pixels::Srgb8(codes) => (
+            codes.iter().map(|code| code.map(decode_srgb8)).collect(),
+            EncodedPhoto::Srgb8(codes),
+        ),
+        Pixels::Srgb16(codes) => (
+            codes.iter().map(|code| code.map(decode_srgb16)).collect(),
+            EncodedPhoto::Srgb16(codes),
+        ),
+        Pixels::Linear(linear) => (linear, EncodedPhoto::Linear),
+    };
+    Ok(Photo {
+        width: image.width,
+        height: image.height,
+        linear,
+        encoded,
+    })
+}
