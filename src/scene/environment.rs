@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::error::Result;
 use super::image_file::{Pixels, read_image};
 use super::reader::{MAX_RADIANCE, Node, Table};
-use super::srgb::{decode_srgb8, decode_srgb16};
+use super::srgb::{decode8, decode16};
 use super::{Environment, EnvironmentMap};
 
 const KEYS: &[&str] = &["image", "radiance", "rotation_deg", "scale"];
@@ -70,11 +70,11 @@ fn read_lat_long(node: &Node, warnings: &mut Vec<String>) -> Result<EnvironmentM
         Pixels::Linear(linear) => linear,
         Pixels::Srgb8(codes) => {
             notes.push(clipped.to_owned());
-            codes.iter().map(|code| code.map(decode_srgb8)).collect()
+            codes.iter().map(|code| code.map(decode8)).collect()
         }
         Pixels::Srgb16(codes) => {
             notes.push(clipped.to_owned());
-            codes.iter().map(|code| code.map(decode_srgb16)).collect()
+            codes.iter().map(|code| code.map(decode16)).collect()
         }
     };
     let mut negative = 0;

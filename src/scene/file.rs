@@ -74,8 +74,10 @@ pub(super) fn read_scene(source: &Source) -> Result<Scene> {
     let camera = read_camera(&root, photo.as_ref())?;
     let lens = read_lens(&root)?;
     let environment = read_environment(&root, &mut warnings)?;
-    let lights = read_lights(&root)?;
-    let objects = ObjectReader::new(photo.is_some(), &mut warnings).read_all(&root)?;
+    let mut lights = read_lights(&root)?;
+    let reader = ObjectReader::new(photo.is_some(), &mut warnings);
+    let (objects, mesh_lights) = reader.read_all(&root)?;
+    lights.extend(mesh_lights);
     Ok(Scene {
         name: scene_name(&source.path),
         path: source.path.clone(),

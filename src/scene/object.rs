@@ -7,13 +7,13 @@ use std::sync::Arc;
 
 use glam::{DMat3, DMat4, DVec3};
 
-use super::error::Result;
+use super::error::{Result, SceneError};
+use super::gltf::{GltfScene, PlacedLight, Problem, PunctualLight, load_gltf};
 use super::material::{lambertian, read_material};
-use super::mesh::{GltfScene, load_gltf};
 use super::pose::read_transform;
 use super::reader::{Choice, MAX_MAGNITUDE, Node, Table};
 use super::shape::Shape;
-use super::{AlphaMode, Instance, Material, Object, Side};
+use super::{AlphaMode, Instance, Light, LightKind, Material, Object, Side};
 
 const KEYS: &[&str] = &[
     "mesh",
@@ -33,8 +33,10 @@ const UNKNOWN_ALBEDO: f32 = 0.5;
 
 /// Reads the objects of one scene file.
 pub(super) struct ObjectReader<'w> {
-    pub has_photo: bool,
-    pub warnings: &'w mut Vec<String>,
+    has_photo: bool,
+    warnings: &'w mut Vec<String>,
+    /// Lights that meshes brought.
+    lights: Vec<Light>,
     /// A file that several objects name is read once.
     meshes: HashMap<PathBuf, Rc<GltfScene>>,
 }
@@ -43,6 +45,7 @@ pub(super) struct ObjectReader<'w> {
 struct Parts {
     name: String,
     instances: Vec<Instance>,
+    lights: Vec<PlacedLight>,
     has_materials: bool,
 }
 
@@ -51,19 +54,20 @@ impl<'w> ObjectReader<'w> {
         Self {
             has_photo,
             warnings,
+            lights: Vec::new(),
             meshes: HashMap::new(),
         }
     }
 
-    /// All of `[[real]]`, then all of `[[virtual]]`.
-    pub fn read_all(mut self, root: &Table) -> Result<Vec<Object>> {
+    /// All of `[[real]]`, then all of `[[virtual]]`, and the lights that came with them.
+    pub fn read_all(mut self, root: &Table) -> Result<(Vec<Object>, Vec<Light>)> {
         let mut objects = Vec::new();
         for (key, side) in [("real", Side::Real), ("virtual", Side::Virtual)] {
             for node in root.list(key)? {
                 objects.push(self.read(&node, side)?);
             }
         }
-        Ok(objects)
+        Ok((objects, self.lights))
     }
 
     fn read(&mut self, node: &Node, side: Side) -> Result<Object> {
@@ -88,6 +92,11 @@ impl<'w> ObjectReader<'w> {
                 .unwrap_or(0.0) as f32,
             albedo_from_photo: false,
         };
+        for light in &parts.lights {
+            let kind = place_light(world_from_object, light)
+                .ok_or_else(|| too_far(&table, "a light of the mesh"))?;
+            self.lights.push(Light { kind, side });
+        }
         self.drop_flat_instances(&mut object);
         check_extent(&table, &object)?;
         self.settle_materials(&table, &mut object, parts.has_materials, shape.is_some())?;
@@ -100,7 +109,7 @@ impl<'w> ObjectReader<'w> {
             Some(mesh) => Rc::clone(mesh),
             None => {
                 let mesh = load_gltf(&path)
-                    .map_err(|problem| node.file_error(&path, &problem.to_string()))?;
+                    .map_err(|error| node.file_error(&path, &advise(&error.problem)))?;
                 self.warnings
                     .extend(node.file_warnings(mesh.warnings.clone()));
                 let mesh = Rc::new(mesh);
@@ -111,6 +120,7 @@ impl<'w> ObjectReader<'w> {
         Ok(Parts {
             name: file_stem(&path),
             instances: mesh.instances.clone(),
+            lights: mesh.lights.clone(),
             has_materials: mesh.has_materials,
         })
     }
@@ -205,6 +215,7 @@ fn read_shape(shape: Shape, table: &Table) -> Result<Parts> {
             primitive: Arc::new(shape.read(table)?),
             material: Arc::new(Material::default()),
         }],
+        lights: Vec::new(),
         has_materials: false,
     })
 }
@@ -240,22 +251,74 @@ fn check_extent(table: &Table, object: &Object) -> Result<()> {
     for instance in &object.instances {
         let world_from_local = object.world_from_object * instance.object_from_local;
         for position in &instance.primitive.positions {
-            let world = world_from_local.transform_point3(DVec3::from(position.map(f64::from)));
-            // Written so that NaN is caught too.
-            if !(world.abs().max_element() <= MAX_MAGNITUDE && world.is_finite()) {
-                return Err(table.error(
-                    format!(
-                        "`{}` reaches {:e} m from the origin",
-                        instance.primitive.name,
-                        world.length()
-                    ),
-                    "coordinates of at most 1e15 m",
-                    "lower `scale` or `translation`",
-                ));
+            let position = DVec3::from(position.map(f64::from));
+            if !is_near(world_from_local.transform_point3(position)) {
+                return Err(too_far(table, &instance.primitive.name));
             }
         }
     }
     Ok(())
+}
+
+/// False for NaN too.
+fn is_near(world: DVec3) -> bool {
+    world.to_array().iter().all(|x| x.abs() <= MAX_MAGNITUDE)
+}
+
+fn too_far(table: &Table, what: &str) -> SceneError {
+    table.error(
+        format!("`{what}` is more than 1e15 m from the origin"),
+        "coordinates of at most 1e15 m",
+        "lower `scale` or `translation`",
+    )
+}
+
+/// None where the light's position or direction is lost in a flat or huge transform.
+fn place_light(world_from_object: DMat4, light: &PlacedLight) -> Option<LightKind> {
+    let world_from_light = world_from_object * light.object_from_light;
+    let position = world_from_light.w_axis.truncate();
+    let direction = world_from_light
+        .transform_vector3(DVec3::NEG_Z)
+        .try_normalize()
+        .map(|direction| direction.to_array());
+    if !is_near(position) {
+        return None;
+    }
+    let position = position.to_array();
+    Some(match light.kind {
+        PunctualLight::Point { intensity } => LightKind::Point {
+            position,
+            intensity,
+        },
+        PunctualLight::Spot {
+            intensity,
+            inner_deg,
+            outer_deg,
+        } => LightKind::Spot {
+            position,
+            direction: direction?,
+            intensity,
+            inner_deg,
+            outer_deg,
+        },
+        PunctualLight::Directional { irradiance } => LightKind::Directional {
+            direction: direction?,
+            irradiance,
+        },
+    })
+}
+
+/// "problem; expected ...; how to mend" of a mesh file.
+fn advise(problem: &Problem) -> String {
+    match problem {
+        Problem::Unreadable(_) => {
+            format!("{problem}; expected a readable file; correct the path or the rights")
+        }
+        Problem::Malformed { .. } => {
+            format!("{problem}; expected valid glTF 2.0; export or repair the model")
+        }
+        Problem::Extension { .. } => problem.to_string(),
+    }
 }
 
 fn file_stem(path: &Path) -> String {

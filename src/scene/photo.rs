@@ -3,7 +3,7 @@
 use super::error::Result;
 use super::image_file::{Pixels, read_image};
 use super::reader::{Node, Table};
-use super::srgb::{decode_srgb8, decode_srgb16};
+use super::srgb::{decode8, decode16};
 use super::{EncodedPhoto, Exposure, Photo};
 
 const KEYS: &[&str] = &["image", "exposure_ev"];
@@ -44,11 +44,11 @@ fn read_photo_image(node: &Node, warnings: &mut Vec<String>) -> Result<Photo> {
     warnings.extend(node.file_warnings(image.warnings));
     let (linear, encoded) = match image.pixels {
         Pixels::Srgb8(codes) => (
-            codes.iter().map(|code| code.map(decode_srgb8)).collect(),
+            codes.iter().map(|code| code.map(decode8)).collect(),
             EncodedPhoto::Srgb8(codes),
         ),
         Pixels::Srgb16(codes) => (
-            codes.iter().map(|code| code.map(decode_srgb16)).collect(),
+            codes.iter().map(|code| code.map(decode16)).collect(),
             EncodedPhoto::Srgb16(codes),
         ),
         Pixels::Linear(linear) => (linear, EncodedPhoto::Linear),

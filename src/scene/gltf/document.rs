@@ -223,8 +223,8 @@ impl Document {
                 "has a type or component type that this attribute cannot have",
             ));
         }
-        let scale = if accessor.normalized || normalize {
-            component_scale(component)
+        let divisor = if accessor.normalized || normalize {
+            component_divisor(component)
         } else {
             1.0
         };
@@ -234,8 +234,8 @@ impl Document {
                 .iter_mut()
                 .zip(element.chunks_exact(component.size()))
             {
-                *value = component_value(component, bytes) * scale;
-                if scale != 1.0 {
+                *value = component_value(component, bytes) / divisor;
+                if divisor != 1.0 {
                     *value = value.max(-1.0);
                 }
             }
@@ -407,12 +407,12 @@ fn strided<'a>(
         .map(move |chunk| &chunk[..size]))
 }
 
-fn component_scale(component: ComponentType) -> f32 {
+fn component_divisor(component: ComponentType) -> f32 {
     match component {
-        ComponentType::I8 => 1.0 / 127.0,
-        ComponentType::U8 => 1.0 / 255.0,
-        ComponentType::I16 => 1.0 / 32767.0,
-        ComponentType::U16 => 1.0 / 65535.0,
+        ComponentType::I8 => 127.0,
+        ComponentType::U8 => 255.0,
+        ComponentType::I16 => 32767.0,
+        ComponentType::U16 => 65535.0,
         ComponentType::U32 | ComponentType::F32 => 1.0,
     }
 }

@@ -391,7 +391,7 @@ fn place_light(
             let inner_deg = f64::from(spot.inner_cone_angle).to_degrees();
             // The f32 nearest to pi/2 lies above it.
             let outer_deg = f64::from(spot.outer_cone_angle).to_degrees().min(90.0);
-            let too_wide = spot.outer_cone_angle > 1.5708;
+            let too_wide = spot.outer_cone_angle > std::f32::consts::FRAC_PI_2;
             if !(inner_deg >= 0.0 && inner_deg < outer_deg) || too_wide {
                 return Err(malformed(
                     &at,

@@ -348,3 +348,101 @@ fn the_desk_camera() {
     assert_eq!((photo.width, photo.height), (640, 480));
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
 }
+
+/// A .gltf of one triangle in the XY plane, under a node moved along +X and beside a spot light; with or without a material.
+fn write_triangle(folder: &Folder, name: &str, material: bool) {
+    let material = if material { r#", "material": 0"# } else { "" };
+    let text = format!(
+        r#"{{
+"asset": {{ "version": "2.0" }},
+"extensionsUsed": ["KHR_lights_punctual"],
+"extensions": {{ "KHR_lights_punctual": {{ "lights": [
+    {{ "type": "spot", "intensity": 7, "spot": {{ "innerConeAngle": 0.1, "outerConeAngle": 0.2 }} }}] }} }},
+"scenes": [{{ "nodes": [0, 1] }}],
+"nodes": [
+    {{ "mesh": 0, "translation": [10, 0, 0] }},
+    {{ "translation": [0, 5, 0], "extensions": {{ "KHR_lights_punctual": {{ "light": 0 }} }} }}],
+"materials": [{{ "pbrMetallicRoughness": {{ "baseColorFactor": [1, 0, 0, 1], "metallicFactor": 0 }} }}],
+"meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0 }}{material} }}] }}],
+"accessors": [{{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }}],
+"bufferViews": [{{ "buffer": 0, "byteLength": 36 }}],
+"buffers": [{{ "byteLength": 36, "uri": "triangle.bin" }}]
+}}"#
+    );
+    std::fs::write(folder.path(name), text).unwrap();
+    let positions: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let bytes: Vec<u8> = positions.iter().flat_map(|x| x.to_le_bytes()).collect();
+    std::fs::write(folder.path("triangle.bin"), bytes).unwrap();
+}
+
+#[test]
+fn meshes_are_placed_with_their_lights_and_shared() {
+    let folder = Folder::new();
+    write_triangle(&folder, "triangle.gltf", true);
+    let scene = folder
+        .load(&format!(
+            "{CAMERA}[[virtual]]\nmesh = \"triangle.gltf\"\nrotation_deg = [0, 90, 0]\ntranslation = [0, 0, 1]\nscale = 2\n\
+             [[real]]\nmesh = \"triangle.gltf\"\n[[real]]\nmesh = \"triangle.gltf\"\nmaterial = {{ metallic = 1 }}\n"
+        ))
+        .unwrap();
+    let names: Vec<&str> = scene.objects.iter().map(|o| o.name.as_str()).collect();
+    assert_eq!(names, ["triangle"; 3]);
+    let [own, overridden, added] = &scene.objects[..] else {
+        panic!("not three objects")
+    };
+    assert_eq!((own.side, added.side), (Side::Real, Side::Virtual));
+    assert!(Arc::ptr_eq(
+        &own.instances[0].primitive,
+        &added.instances[0].primitive
+    ));
+    assert_eq!(own.instances[0].material.base_color, [1.0, 0.0, 0.0, 1.0]);
+    assert!(!own.albedo_from_photo);
+    assert_eq!(overridden.instances[0].material.metallic, 1.0);
+    assert_eq!(overridden.instances[0].material.base_color, [1.0; 4]);
+    let world = added.world_from_object * added.instances[0].object_from_local;
+    // +X goes to -Z about Y, from (10, 0, 0) twice as far.
+    assert!(near(world.transform_point3(DVec3::ZERO), [0.0, 0.0, -19.0]));
+
+    let sides: Vec<Side> = scene.lights.iter().map(|light| light.side).collect();
+    assert_eq!(sides, [Side::Real, Side::Real, Side::Virtual]);
+    let LightKind::Spot {
+        position,
+        direction,
+        intensity,
+        inner_deg,
+        outer_deg,
+    } = scene.lights[2].kind
+    else {
+        panic!("not a spot light")
+    };
+    assert!(near(position.into(), [0.0, 10.0, 1.0]));
+    assert!(near(direction.into(), [-1.0, 0.0, 0.0]));
+    assert_eq!(intensity, [7.0; 3]);
+    assert!((inner_deg - 0.1_f64.to_degrees()).abs() < 1e-5);
+    assert!((outer_deg - 0.2_f64.to_degrees()).abs() < 1e-5);
+}
+
+#[test]
+fn a_scan_without_materials_takes_its_albedo_from_the_photograph() {
+    let folder = Folder::new();
+    write_triangle(&folder, "bare.gltf", false);
+    write_triangle(&folder, "painted.gltf", true);
+    image::RgbImage::new(4, 3)
+        .save(folder.path("photo.png"))
+        .unwrap();
+    let scene = folder
+        .load(
+            "[photo]\nimage = \"photo.png\"\n[camera]\nfx = 4\n[[real]]\nmesh = \"bare.gltf\"\n[[real]]\nmesh = \"painted.gltf\"\n\
+             [[real]]\nmesh = \"painted.gltf\"\nalbedo = \"from-photo\"\n[[virtual]]\nmesh = \"bare.gltf\"\n",
+        )
+        .unwrap();
+    let found: Vec<(bool, f32)> = scene
+        .objects
+        .iter()
+        .map(|o| (o.albedo_from_photo, o.instances[0].material.specular))
+        .collect();
+    assert_eq!(
+        found,
+        [(true, 0.0), (false, 1.0), (true, 0.0), (false, 1.0)]
+    );
+}

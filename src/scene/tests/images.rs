@@ -4,7 +4,7 @@ use exr::WritableImage as _;
 use exr::prelude as exr;
 use image::{DynamicImage, ImageFormat};
 
-use super::super::srgb::{decode_srgb8, decode_srgb16, encode_srgb8};
+use super::super::srgb::{decode8, decode16, encode8};
 use super::super::*;
 use super::{CAMERA, Folder, shared_data};
 
@@ -53,9 +53,9 @@ fn png_of_eight_bits() {
         panic!("not 8 bits")
     };
     assert_eq!(codes[5], [60, 90, 255]);
-    assert_eq!(photo.linear[5], [60, 90, 255].map(decode_srgb8));
+    assert_eq!(photo.linear[5], [60, 90, 255].map(decode8));
     for (linear, code) in photo.linear.iter().zip(codes) {
-        assert_eq!(linear.map(encode_srgb8), *code);
+        assert_eq!(linear.map(encode8), *code);
     }
     // Grey, with a plain alpha, spreads to three channels and says nothing.
     let grey = image::GrayAlphaImage::from_pixel(4, 3, image::LumaA([7, 255]));
@@ -87,7 +87,7 @@ fn png_of_sixteen_bits() {
         panic!("not 16 bits")
     };
     assert_eq!(codes[5], [20001, 1, 65535]);
-    assert_eq!(photo.linear[5], [20001, 1, 65535].map(decode_srgb16));
+    assert_eq!(photo.linear[5], [20001, 1, 65535].map(decode16));
     let grey = image::ImageBuffer::from_pixel(4, 3, image::Luma([300_u16]));
     DynamicImage::ImageLuma16(grey)
         .save(folder.path("grey.png"))

@@ -194,6 +194,10 @@ fn impossible_numbers() {
             "`distortion[3]` is nan",
         ),
         (
+            "[camera]\nwidth = 400\nheight = 300\nfx = 300\ndistortion = @@[-2, 0, 0, 0, 0]\n",
+            "cannot be inverted",
+        ),
+        (
             "@@[camera]\nwidth = 32768\nheight = 32768\nfx = 3\n",
             "pixels",
         ),
@@ -416,6 +420,24 @@ fn missing_files_are_named_with_the_resolved_path() {
     }
     assert_refused_with_camera("[environment]\nimage = @@\"no.hdr\"\n", "names no file");
     assert_refused_with_camera("[[virtual]]\nmesh = @@\"no.glb\"\n", "names no file");
+}
+
+#[test]
+fn meshes_that_cannot_be_read() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("broken.gltf"), "{ \"asset\":\n").unwrap();
+    let draco = r#"{ "asset": { "version": "2.0" }, "extensionsUsed": ["KHR_draco_mesh_compression"], "extensionsRequired": ["KHR_draco_mesh_compression"] }"#;
+    std::fs::write(folder.path("draco.gltf"), draco).unwrap();
+    for (name, fragment) in [
+        ("broken.gltf", "expected valid glTF 2.0"),
+        ("draco.gltf", "KHR_draco_mesh_compression"),
+    ] {
+        let text = format!("{CAMERA}[[virtual]]\nmesh = \"{name}\"\n");
+        let message = folder.load(&text).unwrap_err().to_string();
+        assert!(message.contains("scene.toml:6:8: `mesh` /"), "{message}");
+        assert!(message.contains(fragment), "{message}");
+        assert!(!message.contains('\n'), "{message}");
+    }
 }
 
 #[test]
