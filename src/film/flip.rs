@@ -290,7 +290,7 @@ fn hyab(a: DVec3, b: DVec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::srgb::decode;
+    use crate::scene::srgb::decode;
 
     const WIDTH: usize = 96;
     const HEIGHT: usize = 64;

@@ -14,6 +14,3 @@ pub use sums::{
     Guide, GuideSums, PixelSums, Sample, Sum3, guide_add, is_unusable, pixel_add, pixel_add_real,
     sum_add, sum3_add, two_sum,
 };
-
-/// The transfer function of the photograph, by which the composite is encoded again.
-pub use crate::scene::srgb;
