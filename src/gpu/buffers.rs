@@ -3,7 +3,7 @@
 use bytemuck::Zeroable;
 
 use super::{GpuDevice, GpuError};
-use crate::packed::{AliasEntry, Frame, Light, Material, PixelInfo, TextureRef, Triangle, Vertex};
+use crate::packed::{Frame, Light, Material, PixelInfo, TextureRef, Triangle, Vertex};
 
 /// The arrays of a packed scene, any of them possibly empty; [`SceneBuffers::upload`] takes a whole scene.
 #[derive(Clone, Copy)]
@@ -16,7 +16,7 @@ pub struct SceneParts<'a> {
     pub texels: &'a [u32],
     pub lights: &'a [Light],
     pub env_texels: &'a [f32],
-    pub env_alias: &'a [AliasEntry],
+    pub env_cdf: &'a [f32],
     pub photo_albedo: &'a [[f32; 4]],
     pub pixels: &'a [PixelInfo],
     /// Both worlds, the real one first.
@@ -35,7 +35,7 @@ impl Default for SceneParts<'_> {
             texels: &[],
             lights: &[],
             env_texels: &[],
-            env_alias: &[],
+            env_cdf: &[],
             photo_albedo: &[],
             pixels: &[],
             bvh_nodes: [&[], &[]],
@@ -66,7 +66,7 @@ impl SceneBuffers {
             ("texels", one(parts.texels)),
             ("lights", one(parts.lights)),
             ("environment map", one(parts.env_texels)),
-            ("environment table", one(parts.env_alias)),
+            ("environment table", one(parts.env_cdf)),
             ("albedo of the photograph", one(parts.photo_albedo)),
             ("pixels", one(parts.pixels)),
             ("BVH nodes", [real_nodes, virtual_nodes]),

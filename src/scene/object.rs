@@ -81,6 +81,7 @@ impl<'w> ObjectReader<'w> {
             None => table.required("mesh", "mesh = \"file.glb\"", |node| self.read_mesh(node))?,
         };
         let world_from_object = read_transform(&table)?;
+        table.optional("smooth_radius_m", refuse_smoothing)?;
         let name = table.optional("name", |node| Ok(node.string()?.to_owned()))?;
         let mut object = Object {
             name: name.unwrap_or(parts.name),
@@ -205,6 +206,18 @@ fn check_keys(table: &Table, side: Side) -> Result<Option<Shape>> {
     }
     table.refuse_unknown(&known)?;
     Ok(shape)
+}
+
+/// A scan left rough where smoothing was asked for would be another picture than the one asked for.
+fn refuse_smoothing(node: &Node) -> Result<()> {
+    if node.not_negative()? > 0.0 {
+        return Err(node.error(
+            "`smooth_radius_m` is not applied by this version",
+            "0",
+            "remove it",
+        ));
+    }
+    Ok(())
 }
 
 fn read_shape(shape: Shape, table: &Table) -> Result<Parts> {

@@ -446,3 +446,33 @@ fn a_scan_without_materials_takes_its_albedo_from_the_photograph() {
         [(true, 0.0), (false, 1.0), (true, 0.0), (false, 1.0)]
     );
 }
+
+/// The scan of the desk with a helmet on it, and the raw basket photograph through its lens distortion.
+#[test]
+fn the_measured_scenes() {
+    let (Some(desk), Some(basket), Some(helmet)) = (
+        shared_data("tum_desk_rgbd"),
+        shared_data("kinect_basket_rgbd"),
+        shared_data("gltf_models/DamagedHelmet.glb"),
+    ) else {
+        return;
+    };
+    for (data, photo, distortion) in [
+        (desk, "photo.png", "[0, 0, 0, 0, 0]"),
+        (basket, "raw_photo.png", "[0.178894, -0.323012, 0, 0, 0]"),
+    ] {
+        let text = format!(
+            "[photo]\nimage = '{0}/{photo}'\n[camera]\nfx = 525\ncx = 313\ncy = 257\ndistortion = {distortion}\n\
+             [[real]]\nmesh = '{0}/proxy.glb'\nalbedo = \"from-photo\"\n[[virtual]]\nmesh = '{1}'\nscale = 0.1\n",
+            data.display(),
+            helmet.display()
+        );
+        let scene = Folder::new().load(&text).unwrap();
+        let [proxy, helmet] = &scene.objects[..] else {
+            panic!("not two objects")
+        };
+        assert!(proxy.albedo_from_photo && !helmet.albedo_from_photo);
+        assert!(proxy.instances[0].primitive.triangles.len() > 100_000);
+        assert!(helmet.instances[0].material.base_color_texture.is_some());
+    }
+}

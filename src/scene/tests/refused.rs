@@ -375,6 +375,11 @@ fn impossible_objects() {
             "1e-6",
         ),
         ("shape = \"box\"\nself_shadow_bias_m = @@-1\n", "at least 0"),
+        ("shape = \"box\"\nsmooth_radius_m = @@-1\n", "at least 0"),
+        (
+            "shape = \"box\"\nsmooth_radius_m = @@0.01\n",
+            "not applied by this version",
+        ),
         (
             "shape = \"box\"\nalbedo = @@\"from-photo\"\n",
             "without a photograph",
