@@ -21,8 +21,8 @@ fn sincos_2pi(x: f32) -> SinCos {
     let quarter = floor(x * 4.0 + 0.5);
     let r = x - quarter * 0.25;
     let z = r * r;
-    let p = ((-75.39356 * z + 81.592354) * z - 41.341663) * z - 1.9519177e-7;
-    let s = r * TAU + r * p;
+    let p = ((-75.39356 * z + 81.592354) * z - 41.341663) * z + TAU;
+    let s = r * p;
     let c = 1.0 + z * (((59.250042 * z - 85.44387) * z + 64.93933) * z - 19.739208);
     let quadrant = i32(quarter) & 3;
     let swap = (quadrant & 1) != 0;
@@ -85,7 +85,7 @@ fn exp_(x: f32) -> f32 {
     let n = floor(bounded * LOG2_E + 0.5);
     let r = max(bounded - n * LN_2_HI, -1.0) - n * LN_2_LO;
     let p = (((0.0013814597 * r + 0.008368729) * r + 0.04166839) * r + 0.16666521) * r + 0.49999994;
-    let e = 1.0 + (r + r * r * p);
+    let e = (p * r + 1.0) * r + 1.0;
     return e * bitcast<f32>(u32(i32(n) + 127) << 23u);
 }
 
