@@ -40,7 +40,7 @@ fn acos_(x: f32) -> f32 {
     let z = select(a * a, (1.0 - a) * 0.5, outer);
     let y = select(a, sqrt(z), outer);
     let p = ((((0.037513852 * z + 0.014440975) * z + 0.0318069) * z + 0.044517085) * z
-        + 0.075005032) * z + 0.1666666;
+        + 0.07500503) * z + 0.1666666;
     let asin = y + y * z * p;
     let acos = asin * 2.0;
     let outer_angle = select(acos, PI - acos, x < 0.0);
@@ -97,7 +97,7 @@ fn log_(x: f32) -> f32 {
     let m = select(mantissa, mantissa * 0.5, upper);
     let e = select(exponent, exponent + 1.0, upper);
     let f = m - 1.0;
-    let p = (((((((0.067410477 * f - 0.11582882) * f + 0.11837326) * f - 0.12419113) * f
+    let p = (((((((0.06741048 * f - 0.11582882) * f + 0.11837326) * f - 0.12419113) * f
         + 0.14229332) * f - 0.16667485) * f + 0.20001526) * f - 0.25000012) * f + 0.33333322;
     let z = f * f;
     let log1p = f + z * (f * p - 0.5);
