@@ -10,7 +10,12 @@ use super::GpuError;
 use crate::packed::{self, PackedScene};
 
 /// The embedded modules: name and source.
-pub const MODULES: &[(&str, &str)] = &[("bindings", include_str!("../../shaders/bindings.wgsl"))];
+pub const MODULES: &[(&str, &str)] = &[
+    ("bindings", include_str!("../../shaders/bindings.wgsl")),
+    ("lens", include_str!("../../shaders/lens.wgsl")),
+    ("math", include_str!("../../shaders/math.wgsl")),
+    ("sampler", include_str!("../../shaders/sampler.wgsl")),
+];
 
 macro_rules! features {
     ($($(#[$doc:meta])* $name:ident,)*) => {
