@@ -103,8 +103,8 @@ fn count_rays(st: ptr<function, PathState>, met_real: bool, met_virtual: bool) {
     }
 }
 
-// Traces what the state asks for and leaves the answer in hit_real and hit_virtual.
-fn answer(st: ptr<function, PathState>) {
+// Traces what the state asks for and leaves the answer in hit_real and hit_virtual. `thread`: local invocation index.
+fn answer(st: ptr<function, PathState>, thread: u32) {
     let request = (*st).request;
     var hit_real = miss();
     var hit_virtual = miss();
@@ -125,7 +125,7 @@ fn answer(st: ptr<function, PathState>) {
                 ray.skip = skip;
             }
         }
-        let hit = trace(ray, q.world, any_hit);
+        let hit = trace(ray, q.world, any_hit, thread);
         @if(alpha) {
             if hit.triangle != NONE && layer + 1u < MAX_ALPHA_LAYERS && !meets(st, hit) {
                 t_min = hit.t;

@@ -3,9 +3,9 @@
 use bytemuck::Zeroable;
 
 use super::{GpuDevice, GpuError};
-use crate::packed::{Frame, Light, Material, PixelInfo, TextureRef, Triangle, Vertex};
+use crate::packed::{Frame, Light, Material, PackedScene, PixelInfo, TextureRef, Triangle, Vertex};
 
-/// The arrays of a packed scene, any of them possibly empty; [`SceneBuffers::upload`] takes a whole scene.
+/// The arrays of a packed scene, any of them possibly empty; `From` a packed scene: all of them.
 #[derive(Clone, Copy)]
 pub struct SceneParts<'a> {
     pub frame: Frame,
@@ -40,6 +40,27 @@ impl Default for SceneParts<'_> {
             pixels: &[],
             bvh_nodes: [&[], &[]],
             bvh_leaves: [&[], &[]],
+        }
+    }
+}
+
+impl<'a> From<&'a PackedScene> for SceneParts<'a> {
+    fn from(scene: &'a PackedScene) -> Self {
+        let worlds = [&scene.real_bvh, &scene.virtual_bvh];
+        Self {
+            frame: scene.frame,
+            triangles: &scene.triangles,
+            vertices: &scene.vertices,
+            materials: &scene.materials,
+            texture_refs: &scene.texture_refs,
+            texels: &scene.texels,
+            lights: &scene.lights,
+            env_texels: &scene.env_texels,
+            env_cdf: &scene.env_cdf,
+            photo_albedo: &scene.photo_albedo,
+            pixels: &scene.pixels,
+            bvh_nodes: worlds.map(|bvh| bytemuck::cast_slice(bvh.gpu_nodes())),
+            bvh_leaves: worlds.map(|bvh| bvh.gpu_leaves()),
         }
     }
 }
@@ -164,4 +185,32 @@ fn out_of_memory(gpu: &GpuDevice, arrays: &[(&str, [&[u8]; 2])], error: &wgpu::E
 
 fn mebibytes(bytes: u64) -> String {
     format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::AdapterChoice;
+
+    #[test]
+    fn a_scene_beyond_the_limits_is_refused_with_what_to_do() {
+        if crate::gpu::harness::test_device().is_none() {
+            return;
+        }
+        let mut gpu = GpuDevice::open(AdapterChoice::Any).expect("opens");
+        let vertices = vec![Vertex::zeroed(); 20_000];
+        let parts = SceneParts {
+            vertices: &vertices,
+            ..SceneParts::default()
+        };
+        assert!(SceneBuffers::from_parts(&gpu, &parts).is_ok());
+        gpu.limits.max_storage_buffer_binding_size = 1 << 20;
+        let error = SceneBuffers::from_parts(&gpu, &parts)
+            .err()
+            .expect("does not fit")
+            .to_string();
+        for part in ["vertices", "1.5 MiB", "1.0 MiB", "--backend cpu"] {
+            assert!(error.contains(part), "{error}");
+        }
+    }
 }
