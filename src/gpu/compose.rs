@@ -13,9 +13,14 @@ use crate::packed::{self, PackedScene};
 pub const MODULES: &[(&str, &str)] = &[
     ("bindings", include_str!("../../shaders/bindings.wgsl")),
     ("bsdf", include_str!("../../shaders/bsdf.wgsl")),
+    ("cones", include_str!("../../shaders/cones.wgsl")),
     (
         "contribution",
         include_str!("../../shaders/contribution.wgsl"),
+    ),
+    (
+        "environment",
+        include_str!("../../shaders/environment.wgsl"),
     ),
     ("estimator", include_str!("../../shaders/estimator.wgsl")),
     ("film", include_str!("../../shaders/film.wgsl")),
@@ -24,6 +29,7 @@ pub const MODULES: &[(&str, &str)] = &[
     ("kernels", include_str!("../../shaders/kernels.wgsl")),
     ("lanes", include_str!("../../shaders/lanes.wgsl")),
     ("lens", include_str!("../../shaders/lens.wgsl")),
+    ("lights", include_str!("../../shaders/lights.wgsl")),
     ("math", include_str!("../../shaders/math.wgsl")),
     ("normal", include_str!("../../shaders/normal.wgsl")),
     ("request", include_str!("../../shaders/request.wgsl")),
