@@ -4,6 +4,7 @@
 //! What leaves this module is finite, in range and refers only to things that exist.
 
 pub mod gltf;
+pub mod smooth;
 
 use std::path::PathBuf;
 use std::sync::Arc;
