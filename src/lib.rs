@@ -13,7 +13,7 @@
 //!                              film::Film           per-pixel sums: mask, M*Im, difference, real radiance
 //!                                    │
 //!                                    v
-//!                              film::composite ──> PNG, EXR
+//!                              film::composite ──> output: PNG, EXR
 //! ```
 //!
 //! [`renderer::Renderer`] drives all of it: built once from a scene, advanced by a budget, asked for its film at any moment.
@@ -28,6 +28,7 @@ pub mod gpu;
 pub mod light;
 pub mod material;
 pub mod math;
+pub mod output;
 pub mod packed;
 pub mod renderer;
 pub mod scene;

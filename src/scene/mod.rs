@@ -3,8 +3,29 @@
 //! [`load`] turns a scene file into a [`Scene`]; everything a file can get wrong is refused there, with file, line and column.
 //! What leaves this module is finite, in range and refers only to things that exist.
 
+mod camera;
+mod environment;
+mod error;
+mod file;
 pub mod gltf;
+mod image_file;
+mod light;
+mod material;
+mod object;
+mod photo;
+mod pose;
+mod reader;
+mod settings;
+mod shape;
 pub mod smooth;
+pub mod srgb;
+#[cfg(test)]
+mod tests;
+
+pub use error::SceneError;
+pub use file::load;
+pub use reader::Choice;
+pub use settings::Overrides;
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,0 +1,175 @@
+//! The GPU's tree: obvhs' compressed wide BVH (Ylitie et al., HPG 2017) with the child boxes compressed anew.
+//!
+//! obvhs rounds the offset from the node's corner before it takes the floor, computes the cell size through a rounded logarithm and clamps
+//! what then does not fit; with an outlier a million times larger than the rest its boxes lose triangles. Here cells are found in f64 and
+//! widened by its rounding, so that a decompressed box contains its triangles exactly. What the shader's own arithmetic adds is bounded there.
+
+use glam::{DVec3, Vec3};
+use obvhs::{
+    aabb::Aabb,
+    bvh2::Bvh2,
+    cwbvh::{bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode},
+};
+
+/// Levels that the shader's stack serves, `TRACE_STACK` there.
+const MAX_LEVELS: usize = 24;
+
+const MAX_LEAF_TRIANGLES: u32 = 3;
+
+/// Smallest biased exponent of a cell, 2^-100: keeps cell sizes and their products with inverse directions normal numbers.
+const LEAST_EXPONENT: i32 = 27;
+
+pub(super) struct CompressedBvh {
+    nodes: Vec<[[u32; 4]; 5]>,
+    leaves: Vec<[f32; 4]>,
+}
+
+impl CompressedBvh {
+    /// One node without children.
+    pub(super) fn empty() -> CompressedBvh {
+        CompressedBvh {
+            nodes: vec![[[0; 4]; 5]],
+            leaves: Vec::new(),
+        }
+    }
+
+    /// `None` if the tree is too deep for the shader's stack. The BVH2's depth must be bounded: obvhs recurses.
+    pub(super) fn convert(
+        tree: &Bvh2,
+        triangles: &[[Vec3; 3]],
+        first_id: u32,
+    ) -> Option<CompressedBvh> {
+        let mut converted = bvh2_to_cwbvh(tree, MAX_LEAF_TRIANGLES, true, false);
+        let nodes = &mut converted.nodes;
+        if levels(nodes) > MAX_LEVELS {
+            return None;
+        }
+        // Box of each triangle in leaf order, enlarged as in the BVH2.
+        let mut enlarged = vec![Aabb::empty(); triangles.len()];
+        for node in tree.nodes.iter().filter(|node| node.is_leaf()) {
+            let triangle = tree.primitive_indices[node.first_index as usize];
+            enlarged[triangle as usize] = *node.aabb();
+        }
+        let mut node_boxes = vec![Aabb::empty(); nodes.len()];
+        // Children stand after their parents.
+        for index in (0..nodes.len()).rev() {
+            let node = nodes[index];
+            let mut boxes = [None; 8];
+            for (slot, child_box) in boxes.iter_mut().enumerate() {
+                *child_box = match child(&node, slot) {
+                    Child::None => None,
+                    Child::Node(child) => Some(node_boxes[child]),
+                    Child::Leaf(range) => {
+                        let ids = &converted.primitive_indices[range];
+                        ids.iter()
+                            .map(|&id| enlarged[id as usize])
+                            .reduce(|a, b| a.union(&b))
+                    }
+                };
+            }
+            node_boxes[index] = compress(&mut nodes[index], &boxes);
+        }
+        let mut leaves = Vec::with_capacity(3 * triangles.len());
+        for &index in &converted.primitive_indices {
+            let [a, b, c] = triangles[index as usize];
+            leaves.push([a.x, a.y, a.z, f32::from_bits(first_id + index)]);
+            leaves.push([b.x, b.y, b.z, 0.0]);
+            leaves.push([c.x, c.y, c.z, 0.0]);
+        }
+        Some(CompressedBvh {
+            nodes: bytemuck::cast_slice(nodes).to_vec(),
+            leaves,
+        })
+    }
+
+    pub(super) fn nodes(&self) -> &[[[u32; 4]; 5]] {
+        &self.nodes
+    }
+
+    pub(super) fn leaves(&self) -> &[[f32; 4]] {
+        &self.leaves
+    }
+}
+
+enum Child {
+    None,
+    Node(usize),
+    Leaf(std::ops::Range<usize>),
+}
+
+fn child(node: &CwBvhNode, slot: usize) -> Child {
+    let meta = node.child_meta[slot];
+    if meta == 0 {
+        Child::None
+    } else if node.imask >> slot & 1 == 1 {
+        let before = (node.imask & ((1 << slot) - 1)).count_ones();
+        Child::Node((node.child_base_idx + before) as usize)
+    } else {
+        let first = (node.primitive_base_idx + u32::from(meta & 31)) as usize;
+        Child::Leaf(first..first + (meta >> 5).count_ones() as usize)
+    }
+}
+
+/// Nodes on the longest path.
+fn levels(nodes: &[CwBvhNode]) -> usize {
+    let mut level = vec![1usize; nodes.len()];
+    let mut deepest = 0;
+    for (index, node) in nodes.iter().enumerate() {
+        deepest = deepest.max(level[index]);
+        for slot in 0..8 {
+            if let Child::Node(child) = child(node, slot) {
+                level[child] = level[index] + 1;
+            }
+        }
+    }
+    deepest
+}
+
+/// Writes the corner, the cell sizes and the children's cells; returns the box of all.
+fn compress(node: &mut CwBvhNode, boxes: &[Option<Aabb>; 8]) -> Aabb {
+    let total = boxes
+        .iter()
+        .flatten()
+        .copied()
+        .reduce(|a, b| a.union(&b))
+        .unwrap_or(Aabb::new(Default::default(), Default::default()));
+    let corner = total.min;
+    node.p = corner.into();
+    let offset_of = |point: glam::Vec3A| -> DVec3 { point.as_dvec3() - corner.as_dvec3() };
+    let size = offset_of(total.max);
+    let mut low = [[0u8; 8]; 3];
+    let mut high = [[0u8; 8]; 3];
+    for axis in 0..3 {
+        let exponent = cell_exponent(size[axis]);
+        node.e[axis] = exponent as u8;
+        let cell = f64::from(exponent - 127).exp2();
+        for (slot, child_box) in boxes.iter().enumerate() {
+            let Some(child_box) = child_box else { continue };
+            low[axis][slot] = cell_below(offset_of(child_box.min)[axis], cell);
+            high[axis][slot] = cell_above(offset_of(child_box.max)[axis], cell) as u8;
+        }
+    }
+    [node.child_min_x, node.child_min_y, node.child_min_z] = low;
+    [node.child_max_x, node.child_max_y, node.child_max_z] = high;
+    total
+}
+
+/// Two roundings of an f64: those of the subtraction and of the widening itself.
+const WIDEN: f64 = 2.0 * f64::EPSILON;
+
+fn cell_below(offset: f64, cell: f64) -> u8 {
+    (offset * (1.0 - WIDEN) / cell).floor() as u8
+}
+
+fn cell_above(offset: f64, cell: f64) -> f64 {
+    (offset * (1.0 + WIDEN) / cell).ceil()
+}
+
+/// Biased exponent of the smallest power of two of which 255 cover `size`.
+fn cell_exponent(size: f64) -> i32 {
+    let mut exponent = LEAST_EXPONENT;
+    while cell_above(size, f64::from(exponent - 127).exp2()) > 255.0 {
+        exponent += 1;
+    }
+    exponent
+}

@@ -1,0 +1,180 @@
+//! Few spheres that contain all triangles.
+
+use glam::DVec3;
+
+/// A split must take at least this share off the summed squares of the radii.
+const LEAST_GAIN: f64 = 0.15;
+/// Places tried along each axis.
+const BINS: usize = 16;
+/// Passes of the centre's walk towards the farthest point.
+const WALK_STEPS: usize = 64;
+
+struct Cluster {
+    /// First vertices' places in the leaf array.
+    triangles: Vec<u32>,
+    center: DVec3,
+    radius: f64,
+    split: Option<Box<(Cluster, Cluster)>>,
+}
+
+/// At most `max` spheres (centre, radius) over triangles of three vertices each, `w` ignored.
+///
+/// Splits the cluster whose split saves most of the sum of squared radii, which is what the cones towards the spheres cover, until none
+/// saves enough.
+pub(super) fn cover(vertices: &[[f32; 4]], max: usize) -> Vec<[f32; 4]> {
+    if vertices.is_empty() || max == 0 {
+        return Vec::new();
+    }
+    let all = (0..vertices.len() as u32).step_by(3).collect();
+    let mut clusters = vec![Cluster::new(vertices, all)];
+    if max > 1 {
+        clusters[0].find_split(vertices);
+    }
+    while clusters.len() < max {
+        let best = clusters
+            .iter()
+            .enumerate()
+            .max_by(|(_, a), (_, b)| a.gain().total_cmp(&b.gain()));
+        let Some((index, cluster)) = best else { break };
+        if cluster.split.is_none() {
+            break;
+        }
+        let Some(parts) = clusters.swap_remove(index).split else {
+            break;
+        };
+        let (mut a, mut b) = *parts;
+        a.find_split(vertices);
+        b.find_split(vertices);
+        clusters.extend([a, b]);
+    }
+    clusters.iter().map(Cluster::rounded).collect()
+}
+
+fn corners(vertices: &[[f32; 4]], triangle: u32) -> impl Iterator<Item = DVec3> + '_ {
+    let first = triangle as usize;
+    vertices[first..first + 3]
+        .iter()
+        .map(|v| DVec3::new(v[0].into(), v[1].into(), v[2].into()))
+}
+
+impl Cluster {
+    fn new(vertices: &[[f32; 4]], triangles: Vec<u32>) -> Cluster {
+        let points = || triangles.iter().flat_map(|&t| corners(vertices, t));
+        let mut low = DVec3::INFINITY;
+        let mut high = DVec3::NEG_INFINITY;
+        for point in points() {
+            low = low.min(point);
+            high = high.max(point);
+        }
+        let farthest = |center: DVec3| {
+            let mut worst = (0.0, center);
+            for point in points() {
+                let squared = point.distance_squared(center);
+                if squared > worst.0 {
+                    worst = (squared, point);
+                }
+            }
+            (worst.0.sqrt(), worst.1)
+        };
+        // Badoiu and Clarkson 2003: steps of 1/(i + 1) towards the farthest point converge to the smallest sphere.
+        let mut walk = 0.5 * (low + high);
+        let (mut radius, mut far) = farthest(walk);
+        let mut center = walk;
+        let steps = if triangles.len() > 100_000 {
+            8
+        } else {
+            WALK_STEPS
+        };
+        for step in 1..=steps {
+            walk += (far - walk) / (step + 1) as f64;
+            let reach;
+            (reach, far) = farthest(walk);
+            if reach < radius {
+                (radius, center) = (reach, walk);
+            }
+        }
+        Cluster {
+            triangles,
+            center,
+            radius,
+            split: None,
+        }
+    }
+
+    fn gain(&self) -> f64 {
+        self.split.as_ref().map_or(0.0, |parts| {
+            self.radius.powi(2) - parts.0.radius.powi(2) - parts.1.radius.powi(2)
+        })
+    }
+
+    /// Finds the best split by the surface area heuristic on the triangles' centres, and keeps it if it gains enough.
+    fn find_split(&mut self, vertices: &[[f32; 4]]) {
+        let centers: Vec<DVec3> = self
+            .triangles
+            .iter()
+            .map(|&t| corners(vertices, t).sum::<DVec3>() / 3.0)
+            .collect();
+        let (low, high) = centers
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &c| {
+                (low.min(c), high.max(c))
+            });
+        let mut best = (f64::INFINITY, 0, 0.0);
+        for axis in 0..3 {
+            let width = (high[axis] - low[axis]) / BINS as f64;
+            if width <= 0.0 {
+                continue;
+            }
+            let mut bins = [(DVec3::INFINITY, DVec3::NEG_INFINITY); BINS];
+            for (&triangle, center) in self.triangles.iter().zip(&centers) {
+                let bin = (((center[axis] - low[axis]) / width) as usize).min(BINS - 1);
+                for corner in corners(vertices, triangle) {
+                    bins[bin] = (bins[bin].0.min(corner), bins[bin].1.max(corner));
+                }
+            }
+            for plane in 1..BINS {
+                let diagonal = |part: &[(DVec3, DVec3)]| {
+                    let (low, high) = part
+                        .iter()
+                        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |a, b| {
+                            (a.0.min(b.0), a.1.max(b.1))
+                        });
+                    (high - low).length_squared()
+                };
+                let cost = diagonal(&bins[..plane]) + diagonal(&bins[plane..]);
+                if cost < best.0 {
+                    best = (cost, axis, low[axis] + width * plane as f64);
+                }
+            }
+        }
+        let (cost, axis, place) = best;
+        if !cost.is_finite() {
+            return;
+        }
+        let (mut left, mut right) = (Vec::new(), Vec::new());
+        for (&triangle, center) in self.triangles.iter().zip(&centers) {
+            let side = if center[axis] < place {
+                &mut left
+            } else {
+                &mut right
+            };
+            side.push(triangle);
+        }
+        if left.is_empty() || right.is_empty() {
+            return;
+        }
+        let parts = (Cluster::new(vertices, left), Cluster::new(vertices, right));
+        let kept = parts.0.radius.powi(2) + parts.1.radius.powi(2);
+        if kept <= (1.0 - LEAST_GAIN) * self.radius.powi(2) {
+            self.split = Some(Box::new(parts));
+        }
+    }
+
+    /// In f32, the radius raised by what rounding the centre and itself can lose.
+    fn rounded(&self) -> [f32; 4] {
+        let center = self.center.as_vec3();
+        let shift = center.as_dvec3().distance(self.center);
+        let radius = (self.radius + shift) * (1.0 + 1e-6);
+        [center.x, center.y, center.z, (radius as f32).next_up()]
+    }
+}

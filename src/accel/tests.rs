@@ -1,0 +1,425 @@
+use glam::Vec3;
+
+use super::test_support::*;
+use super::trace::Kernel;
+use super::*;
+
+fn kernels() -> Vec<Kernel> {
+    let mut kernels = vec![Kernel::Portable];
+    if Kernel::best() != Kernel::Portable {
+        kernels.push(Kernel::best());
+    }
+    kernels
+}
+
+/// Random rays about a box of half-size `scale` around `center`: along axes, at random, towards the box; some with an interval.
+fn random_ray(random: &mut Random, center: Vec3, scale: f32) -> Ray {
+    let origin = center + random.cube() * 2.0 * scale;
+    let direction = match random.bits() % 4 {
+        0 => random.direction(),
+        1 => {
+            let axis = [Vec3::X, Vec3::Y, Vec3::Z][random.bits() as usize % 3];
+            if random.unit() < 0.5 { -axis } else { axis }
+        }
+        _ => (center + random.cube() * scale - origin).normalize(),
+    };
+    let mut ray = ray(origin, direction);
+    if random.bits().is_multiple_of(5) {
+        ray.t_max = scale * (0.5 + 2.0 * random.unit());
+        ray.t_min = 0.3 * ray.t_max;
+    }
+    ray
+}
+
+/// Random rays against brute force, closest and any, on all kernels bit for bit; returns the number of hits.
+fn compare(triangles: &[[Vec3; 3]], center: Vec3, scale: f32, rays: usize) -> usize {
+    let first_id = 7;
+    let world = WorldBvh::build(triangles, first_id).expect("builds");
+    let mut random = Random(99);
+    let mut hits = 0;
+    for _ in 0..rays {
+        let ray = random_ray(&mut random, center, scale);
+        let reference = world.closest_by(Kernel::Portable, &ray);
+        for kernel in kernels() {
+            assert_eq!(
+                world.closest_by(kernel, &ray),
+                reference,
+                "{kernel:?} {ray:?}"
+            );
+            let any = world.any_by(kernel, &ray);
+            assert_eq!(any, reference.is_hit(), "{kernel:?} {ray:?}");
+        }
+        hits += usize::from(reference.is_hit());
+        if let Err(wrong) = judge(triangles, first_id, &ray, &reference) {
+            panic!("{wrong}: {ray:?}");
+        }
+    }
+    hits
+}
+
+fn scaled(mut triangles: Vec<[Vec3; 3]>, scale: f32) -> Vec<[Vec3; 3]> {
+    triangles.iter_mut().flatten().for_each(|v| *v *= scale);
+    triangles
+}
+
+#[test]
+fn random_triangles_match_brute_force() {
+    for (size, seed) in [(0.02, 1), (0.2, 2), (2.0, 3)] {
+        let hits = compare(&soup(2000, size, seed), Vec3::ZERO, 1.0, 1000);
+        assert!(hits > 10, "{hits}");
+    }
+}
+
+#[test]
+fn slivers_match_brute_force() {
+    let hits = compare(&slivers(3000, 4), Vec3::ZERO, 1.0, 2000);
+    assert!(hits > 100, "{hits}");
+}
+
+#[test]
+fn scales_from_1e_4_to_1e6_match_brute_force() {
+    for scale in [1e-4, 1e-2, 1e2, 1e4, 1e6] {
+        let hits = compare(&scaled(soup(1000, 0.2, 5), scale), Vec3::ZERO, scale, 500);
+        assert!(hits > 100, "{hits} at {scale}");
+    }
+}
+
+#[test]
+fn an_outlier_a_million_times_larger_loses_nothing() {
+    for scale in [1e-4, 1.0, 1e6] {
+        let mut triangles = scaled(soup(1000, 0.2, 6), scale);
+        let far = 1e6 * scale;
+        triangles.push([
+            Vec3::new(-far, -3.0 * scale, -far),
+            Vec3::new(far, -3.0 * scale, -far),
+            Vec3::new(0.3 * far, -3.0 * scale, far),
+        ]);
+        triangles.push([far, 1.01 * far, 1.02 * far].map(|x| Vec3::new(x, far, 0.5 * x * x / far)));
+        let hits = compare(&triangles, Vec3::ZERO, scale, 1000);
+        assert!(hits > 300, "{hits} at {scale}");
+    }
+}
+
+#[test]
+fn few_triangles_match_brute_force() {
+    for count in 1..40 {
+        compare(&soup(count, 1.0, 100 + count as u64), Vec3::ZERO, 1.0, 100);
+    }
+}
+
+#[test]
+fn brute_force_notices_a_lost_and_a_wrong_triangle() {
+    let triangles = soup(500, 0.3, 8);
+    let world = WorldBvh::build(&triangles[1..], 1).expect("builds");
+    let mut random = Random(9);
+    let wrong = (0..20_000)
+        .filter(|_| {
+            let ray = random_ray(&mut random, Vec3::ZERO, 1.0);
+            judge(&triangles, 0, &ray, &world.closest(&ray)).is_err()
+        })
+        .count();
+    assert!(wrong > 0, "triangle 0 was never missed");
+    let [a, b, c] = triangles[1];
+    let ray = ray((a + b + c) / 3.0 - 5.0 * Vec3::Z, Vec3::Z);
+    let mut hit = world.closest(&ray);
+    assert!(hit.is_hit());
+    judge(&triangles, 0, &ray, &hit).expect("right as it is");
+    hit.t *= 1.001;
+    assert!(judge(&triangles, 0, &ray, &hit).is_err());
+}
+
+#[test]
+fn nothing_is_hit_without_triangles() {
+    let world = WorldBvh::build(&[], 0).expect("builds");
+    for kernel in kernels() {
+        let ray = ray(Vec3::ZERO, Vec3::Z);
+        assert_eq!(world.closest_by(kernel, &ray), Hit::MISS);
+        assert!(!world.any_by(kernel, &ray));
+    }
+    assert_eq!(world.bounds(), None);
+    assert_eq!(world.gpu_nodes().len(), 1);
+    assert!(world.gpu_leaves().is_empty());
+    assert!(world.bounding_spheres(4).is_empty());
+}
+
+#[test]
+fn rays_that_are_not_finite_miss() {
+    let world = WorldBvh::build(&soup(100, 2.0, 10), 0).expect("builds");
+    let good = ray(Vec3::new(0.0, 0.0, -5.0), Vec3::Z);
+    assert!(world.any(&good));
+    for bad in [f32::NAN, f32::INFINITY] {
+        for axis in 0..3 {
+            let mut origin = good;
+            origin.origin[axis] = bad;
+            let mut direction = good;
+            direction.direction[axis] = bad;
+            assert!(!world.any(&origin) && !world.any(&direction));
+        }
+    }
+    let (mut no_start, mut no_end) = (good, good);
+    no_start.t_min = f32::NAN;
+    no_end.t_max = f32::NAN;
+    let still = ray(good.origin, Vec3::ZERO);
+    for bad in [no_start, no_end, still] {
+        for kernel in kernels() {
+            assert_eq!(world.closest_by(kernel, &bad), Hit::MISS);
+        }
+    }
+}
+
+#[test]
+fn negative_zero_directions_hit_as_positive_ones() {
+    let triangles = soup(2000, 0.3, 11);
+    let world = WorldBvh::build(&triangles, 0).expect("builds");
+    let mut random = Random(12);
+    let mut hits = 0;
+    for _ in 0..1000 {
+        let origin = random.cube() + Vec3::new(0.0, 0.0, -3.0);
+        for kernel in kernels() {
+            let expected = world.closest_by(kernel, &ray(origin, Vec3::Z));
+            let got = world.closest_by(kernel, &ray(origin, Vec3::new(-0.0, -0.0, 1.0)));
+            assert_eq!(got, expected);
+            hits += usize::from(got.is_hit());
+        }
+    }
+    assert!(hits > 500, "{hits}");
+}
+
+#[test]
+fn coincident_triangles_are_met_once_each_in_order_of_id() {
+    let quad = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let triangles = vec![quad; 100];
+    let world = WorldBvh::build(&triangles, 50).expect("builds");
+    for kernel in kernels() {
+        let mut ray = ray(Vec3::new(0.2, 0.3, -1.5), Vec3::Z);
+        for expected in 50..150 {
+            let hit = world.closest_by(kernel, &ray);
+            assert_eq!((hit.triangle, hit.t), (expected, 1.5));
+            ray.t_min = hit.t;
+            ray.skip = hit.triangle;
+        }
+        assert_eq!(world.closest_by(kernel, &ray), Hit::MISS);
+        assert!(!world.any_by(kernel, &ray));
+    }
+}
+
+#[test]
+fn the_far_end_is_excluded() {
+    let world = WorldBvh::build(&[[Vec3::ZERO, Vec3::X, Vec3::Y]], 0).expect("builds");
+    for kernel in kernels() {
+        let mut ray = ray(Vec3::new(0.25, 0.25, -2.0), Vec3::Z);
+        ray.t_max = 2.0;
+        assert!(!world.any_by(kernel, &ray));
+        ray.t_max = 2.0f32.next_up();
+        assert!(world.any_by(kernel, &ray));
+        ray.t_min = 2.0;
+        assert!(!world.any_by(kernel, &ray), "skip = NONE excludes t_min");
+    }
+}
+
+#[test]
+fn barycentric_coordinates_rebuild_the_point() {
+    let triangles = soup(500, 0.5, 13);
+    let world = WorldBvh::build(&triangles, 0).expect("builds");
+    let mut random = Random(14);
+    let mut hits = 0;
+    for _ in 0..2000 {
+        let ray = random_ray(&mut random, Vec3::ZERO, 1.0);
+        let hit = world.closest(&ray);
+        if hit.is_hit() {
+            let [a, b, c] = triangles[hit.triangle as usize];
+            let point = (1.0 - hit.u - hit.v) * a + hit.u * b + hit.v * c;
+            let along = ray.origin + ray.direction * hit.t;
+            let normal = (b - a).cross(c - a).normalize();
+            let cosine = normal.dot(ray.direction).abs();
+            assert!(point.distance(along) * cosine < 5e-6, "{point} {along}");
+            hits += 1;
+        }
+    }
+    assert!(hits > 500, "{hits}");
+}
+
+/// Rays from inside a closed mesh at points of its edges and vertices; counts misses and rays.
+fn leaks(
+    kernel: Kernel,
+    world: &WorldBvh,
+    mesh: &[[Vec3; 3]],
+    rays_per_edge: usize,
+) -> (usize, usize) {
+    let mut random = Random(15);
+    let (mut missed, mut total) = (0, 0);
+    for [a, b, c] in mesh {
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            for index in 0..rays_per_edge {
+                let target = match index {
+                    0 => *p,
+                    1 => 0.5 * (*p + *q),
+                    _ => p.lerp(*q, random.unit()),
+                };
+                let origin = if index % 3 == 0 {
+                    Vec3::ZERO
+                } else {
+                    random.cube() * 0.5
+                };
+                let hit = world.any_by(kernel, &ray(origin, (target - origin).normalize()));
+                missed += usize::from(!hit);
+                total += 1;
+            }
+        }
+    }
+    (missed, total)
+}
+
+#[test]
+fn rays_at_shared_edges_and_vertices_never_pass() {
+    let mesh = sphere(60, 120, 1.0);
+    let world = WorldBvh::build(&mesh, 0).expect("builds");
+    let mut total = 0;
+    for kernel in kernels() {
+        let (missed, rays) = leaks(kernel, &world, &mesh, 12);
+        assert_eq!(missed, 0, "{kernel:?} of {rays}");
+        total += rays;
+    }
+    assert!(total > 1_000_000 || kernels().len() == 1, "{total}");
+    let mut open = mesh.clone();
+    open.remove(1234);
+    let open = WorldBvh::build(&open, 0).expect("builds");
+    assert!(leaks(Kernel::best(), &open, &mesh, 2).0 > 0);
+}
+
+/// Edges a thousand times longer than their distance from the ray.
+#[test]
+fn rays_along_long_thin_boxes_never_pass() {
+    let (long, thin) = (1e3, 1.0);
+    let corner = |i: u32| {
+        Vec3::new(
+            if i & 1 == 0 { -long } else { long },
+            if i & 2 == 0 { -thin } else { thin },
+            if i & 4 == 0 { -thin } else { thin },
+        )
+    };
+    let quads = [
+        [0, 1, 3, 2],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 3, 7, 6],
+        [0, 2, 6, 4],
+        [1, 3, 7, 5],
+    ];
+    let mesh: Vec<[Vec3; 3]> = quads
+        .iter()
+        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]].map(|t| t.map(corner)))
+        .collect();
+    let world = WorldBvh::build(&mesh, 0).expect("builds");
+    let mut random = Random(16);
+    for kernel in kernels() {
+        for _ in 0..100_000 {
+            let target = Vec3::new(
+                (random.unit() - 0.5) * 2.0 * long,
+                if random.unit() < 0.5 { -thin } else { thin },
+                if random.unit() < 0.5 { -thin } else { thin },
+            );
+            let origin = random.cube() * Vec3::new(0.1 * long, 0.5, 0.5);
+            let ray = ray(origin, (target - origin).normalize());
+            assert!(world.any_by(kernel, &ray), "{kernel:?} {ray:?}");
+        }
+    }
+}
+
+/// 1e5 triangles on which a naive clustering makes a chain.
+fn hostile() -> Vec<(&'static str, Vec<[Vec3; 3]>)> {
+    let base = [
+        Vec3::new(-1.0, -1.0, 0.0),
+        Vec3::new(1.0, -1.0, 0.1),
+        Vec3::new(0.0, 1.0, 0.2),
+    ];
+    let size = |i: usize| 1.0 + i as f32 * 1e-3;
+    vec![
+        ("identical", vec![base; 100_000]),
+        (
+            "concentric",
+            (0..100_000).map(|i| base.map(|v| v * size(i))).collect(),
+        ),
+        (
+            "nested in a corner",
+            (0..100_000)
+                .map(|i| base.map(|v| (v - base[0]) * size(i)))
+                .collect(),
+        ),
+        (
+            "nested pairs",
+            (0..100_000)
+                .map(|i| base.map(|v| v * size(i / 2) * if i % 2 == 0 { 1.0 } else { -1.0 }))
+                .collect(),
+        ),
+    ]
+}
+
+#[test]
+fn identical_and_nested_triangles_build() {
+    for (name, triangles) in hostile() {
+        let world = WorldBvh::build(&triangles, 3).expect("builds");
+        let ray = ray(Vec3::new(0.05, 0.02, -3000.0), Vec3::Z);
+        let hit = world.closest(&ray);
+        assert!(hit.is_hit(), "{name}");
+        judge(&triangles, 3, &ray, &hit).expect(name);
+    }
+}
+
+#[test]
+fn coordinates_out_of_range_are_refused() {
+    for bad in [f32::NAN, f32::INFINITY, 2e13, -2e13] {
+        let mut triangles = soup(3, 0.1, 17);
+        triangles[1][2].y = bad;
+        let error = WorldBvh::build(&triangles, 0).err();
+        assert_eq!(error, Some(AccelError::Coordinate { triangle: 1 }));
+    }
+}
+
+fn covered(triangles: &[[Vec3; 3]], spheres: &[[f32; 4]]) -> bool {
+    triangles.iter().all(|triangle| {
+        // A triangle lies in a ball if its corners do; one ball must hold all three.
+        spheres.iter().any(|&[x, y, z, r]| {
+            let center = Vec3::new(x, y, z).as_dvec3();
+            let inside = |v: &Vec3| v.as_dvec3().distance(center) <= f64::from(r);
+            triangle.iter().all(inside)
+        })
+    })
+}
+
+fn moved(triangles: &[[Vec3; 3]], by: Vec3) -> Vec<[Vec3; 3]> {
+    triangles.iter().map(|t| t.map(|v| v + by)).collect()
+}
+
+#[test]
+fn spheres_cover_tightly_and_are_few() {
+    let ball = sphere(30, 60, 1.0);
+    let one = WorldBvh::build(&ball, 0)
+        .expect("builds")
+        .bounding_spheres(16);
+    assert_eq!(one.len(), 1, "{one:?}");
+    assert!(one[0][3] < 1.00001, "{one:?}");
+    assert!(covered(&ball, &one));
+    assert!(!covered(&moved(&ball, Vec3::X * 1e-3), &one));
+
+    let mut three = ball.clone();
+    three.extend(moved(&ball, Vec3::new(10.0, 0.0, 0.0)));
+    three.extend(moved(&ball, Vec3::new(0.0, 20.0, 5.0)));
+    let world = WorldBvh::build(&three, 0).expect("builds");
+    let cover = world.bounding_spheres(16);
+    assert_eq!(cover.len(), 3, "{cover:?}");
+    assert!(cover.iter().all(|s| s[3] < 1.00001), "{cover:?}");
+    for max in 0..5 {
+        let cover = world.bounding_spheres(max);
+        assert!(cover.len() <= max);
+        assert_eq!(covered(&three, &cover), max > 0);
+    }
+
+    for (seed, scale) in [(1, 1e-4), (2, 1.0), (3, 1e6)] {
+        let mesh = scaled(slivers(2000, seed), scale);
+        let cover = WorldBvh::build(&mesh, 0)
+            .expect("builds")
+            .bounding_spheres(16);
+        assert!(covered(&mesh, &cover), "{cover:?}");
+    }
+}

@@ -1,0 +1,337 @@
+//! Traversal of the CPU's tree and the triangle test. Twin of `shaders/trace.wgsl`: the triangle test there does the same f32 operations.
+
+use super::wide::{TriangleBlock, WideBvh, WideNode};
+use super::{Hit, Ray};
+use crate::packed::NONE;
+
+/// Factor by which a box may be farther than a hit: 16 units of rounding (see the module's proof).
+pub(super) const BOX_MARGIN: f32 = 1.0 + 1.0 / (1 << 20) as f32;
+
+/// Slack of the projected bounds test, relative to the largest projected coordinate: four units of rounding, doubled.
+pub(super) const PROJECTED_SLACK: f32 = 1.0 / (1 << 21) as f32;
+
+/// Which instructions the traversal uses; the results are the same.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Kernel {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+}
+
+impl Kernel {
+    /// The fastest that this processor has.
+    pub(super) fn best() -> Kernel {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt")
+        {
+            return Kernel::Avx2;
+        }
+        Kernel::Portable
+    }
+}
+
+/// What the traversal needs to know of a ray.
+pub(super) struct RayFrame {
+    pub(super) origin: [f32; 3],
+    pub(super) inv_direction: [f32; 3],
+    /// Row of each axis' nearer planes in a node.
+    pub(super) near_row: [usize; 3],
+    /// Axis permutation: the last one is the direction's largest component.
+    pub(super) axes: [usize; 3],
+    /// Shear that takes the direction to the last axis, and the scale along it.
+    pub(super) shear: [f32; 3],
+    pub(super) t_min: f32,
+    pub(super) t_max: f32,
+    skip: u32,
+}
+
+impl RayFrame {
+    /// `None` for a ray that hits nothing whatever there is: not finite, without direction or with an empty interval.
+    fn new(ray: &Ray) -> Option<RayFrame> {
+        let origin = ray.origin.to_array();
+        // -0 + 0 is +0, so that both zeros take the same inverse.
+        let direction = ray.direction.to_array().map(|d| d + 0.0);
+        let sound = ray.origin.is_finite() && ray.direction.is_finite() && ray.t_min < ray.t_max;
+        let magnitude = direction.map(f32::abs);
+        let largest = if magnitude[0] > magnitude[1] {
+            if magnitude[0] > magnitude[2] { 0 } else { 2 }
+        } else if magnitude[1] > magnitude[2] {
+            1
+        } else {
+            2
+        };
+        if !sound || magnitude[largest] == 0.0 {
+            return None;
+        }
+        let axes = [(largest + 1) % 3, (largest + 2) % 3, largest];
+        let along = direction[largest];
+        Some(RayFrame {
+            origin,
+            inv_direction: direction.map(|d| 1.0 / d),
+            near_row: [0, 1, 2].map(|axis| 2 * axis + usize::from(direction[axis] < 0.0)),
+            axes,
+            shear: [
+                direction[axes[0]] / along,
+                direction[axes[1]] / along,
+                1.0 / along,
+            ],
+            t_min: ray.t_min,
+            t_max: ray.t_max,
+            skip: ray.skip,
+        })
+    }
+}
+
+/// The nearest accepted triangle so far.
+#[derive(Clone, Copy)]
+pub(super) struct Found {
+    pub(super) t: f32,
+    pub(super) id: u32,
+    /// Block << 3 | lane, [`NONE`] for none.
+    pub(super) place: u32,
+}
+
+impl Found {
+    fn none(frame: &RayFrame) -> Found {
+        Found {
+            t: frame.t_max,
+            // No id is smaller: a hit at exactly t_max is not accepted.
+            id: 0,
+            place: NONE,
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn accepts(&self, frame: &RayFrame, t: f32, id: u32) -> bool {
+        (t > frame.t_min || (t == frame.t_min && id > frame.skip))
+            && (t < self.t || (t == self.t && id < self.id))
+    }
+}
+
+/// Defines a traversal `fn NAME<const ANY: bool, const STACK: usize>(&WideBvh, &RayFrame, Found) -> Found`.
+///
+/// `$boxes(node, lanes, limit)` returns the mask of children entered before `limit` and their distances; `$block(block, lanes, limit)` the
+/// mask of triangles hit in [t_min, limit] and their distances; `$lanes` makes the vector form of a ray; `$prefetch(tree, child)` may
+/// fetch a child that waits.
+macro_rules! traversal {
+    ($(#[$attribute:meta])* fn $name:ident($lanes:path, $boxes:path, $block:path, $prefetch:path)) => {
+        $(#[$attribute])*
+        fn $name<const ANY: bool, const STACK: usize>(
+            tree: &$crate::accel::wide::WideBvh,
+            frame: &$crate::accel::trace::RayFrame,
+            mut found: $crate::accel::trace::Found,
+        ) -> $crate::accel::trace::Found {
+            use $crate::accel::{trace::BOX_MARGIN, wide::LEAF};
+            let lanes = $lanes(frame);
+            let mut stack = [0u64; STACK];
+            let mut waiting = 0;
+            let mut child = 0u32;
+            loop {
+                if child & LEAF == 0 {
+                    let node = &tree.nodes[child as usize];
+                    let (mut mask, near) = $boxes(node, &lanes, found.t);
+                    if mask != 0 {
+                        let mut lane = mask.trailing_zeros() as usize & 7;
+                        mask &= mask - 1;
+                        child = node.children[lane];
+                        let mut nearest = near[lane];
+                        while mask != 0 {
+                            lane = mask.trailing_zeros() as usize & 7;
+                            mask &= mask - 1;
+                            let (mut far_child, mut far) = (node.children[lane], near[lane]);
+                            if far < nearest {
+                                std::mem::swap(&mut far_child, &mut child);
+                                std::mem::swap(&mut far, &mut nearest);
+                            }
+                            $prefetch(tree, far_child);
+                            stack[waiting] = u64::from(far.to_bits()) << 32 | u64::from(far_child);
+                            waiting += 1;
+                        }
+                        continue;
+                    }
+                } else {
+                    let first = (child & !LEAF) >> 3;
+                    for block_index in first..=first + (child & 7) {
+                        let block = &tree.blocks[block_index as usize];
+                        let (mut mask, distances) = $block(block, &lanes, found.t);
+                        while mask != 0 {
+                            let lane = mask.trailing_zeros() as usize & 7;
+                            mask &= mask - 1;
+                            let (t, id) = (distances[lane], block.ids[lane]);
+                            if found.accepts(frame, t, id) {
+                                found.t = t;
+                                found.id = id;
+                                found.place = block_index << 3 | lane as u32;
+                                if ANY {
+                                    return found;
+                                }
+                            }
+                        }
+                    }
+                }
+                let limit = found.t * BOX_MARGIN;
+                loop {
+                    if waiting == 0 {
+                        return found;
+                    }
+                    waiting -= 1;
+                    let entry = stack[waiting];
+                    if f32::from_bits((entry >> 32) as u32) <= limit {
+                        child = entry as u32;
+                        break;
+                    }
+                }
+            }
+        }
+    };
+}
+pub(super) use traversal;
+
+/// Most entries in the stack that most trees need; clearing a larger one costs time on every ray.
+const SMALL_STACK: usize = 128;
+const LARGE_STACK: usize = 7 * super::wide::MAX_LEVELS + 1;
+
+fn traverse<const ANY: bool>(tree: &WideBvh, kernel: Kernel, frame: &RayFrame) -> Found {
+    let found = Found::none(frame);
+    let small = 7 * tree.levels < SMALL_STACK;
+    match (kernel, small) {
+        (Kernel::Portable, true) => portable::<ANY, SMALL_STACK>(tree, frame, found),
+        (Kernel::Portable, false) => portable::<ANY, LARGE_STACK>(tree, frame, found),
+        #[cfg(target_arch = "x86_64")]
+        (Kernel::Avx2, true) => super::avx2::traverse::<ANY, SMALL_STACK>(tree, frame, found),
+        #[cfg(target_arch = "x86_64")]
+        (Kernel::Avx2, false) => super::avx2::traverse::<ANY, LARGE_STACK>(tree, frame, found),
+    }
+}
+
+pub(super) fn closest(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> Hit {
+    let Some(frame) = RayFrame::new(ray) else {
+        return Hit::MISS;
+    };
+    let found = traverse::<false>(tree, kernel, &frame);
+    if found.place == NONE {
+        return Hit::MISS;
+    }
+    let block = &tree.blocks[(found.place >> 3) as usize];
+    let projected = project(block, &frame, (found.place & 7) as usize);
+    Hit {
+        t: found.t,
+        u: projected.weights[1],
+        v: projected.weights[2],
+        triangle: found.id,
+    }
+}
+
+pub(super) fn any(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> bool {
+    RayFrame::new(ray).is_some_and(|frame| {
+        let found = traverse::<true>(tree, kernel, &frame);
+        found.place != NONE
+    })
+}
+
+/// One triangle seen along the ray.
+struct Projected {
+    /// Barycentric weights of the three vertices.
+    weights: [f32; 3],
+    t: f32,
+    hit: bool,
+}
+
+/// The watertight test (Woop et al. 2013) of one lane.
+///
+/// Without fused operations the edge function of (p, q) is exactly minus that of (q, p), and its sign is never the wrong one, but rounding
+/// can make it zero. Zero counts as inside; the bounds test undoes that for triangles much smaller than their distance from the ray.
+#[inline(always)]
+fn project(block: &TriangleBlock, frame: &RayFrame, lane: usize) -> Projected {
+    let [kx, ky, kz] = frame.axes;
+    let [shear_x, shear_y, scale] = frame.shear;
+    let vertex = |i: usize| {
+        let x = block.rows[3 * i + kx][lane] - frame.origin[kx];
+        let y = block.rows[3 * i + ky][lane] - frame.origin[ky];
+        let z = block.rows[3 * i + kz][lane] - frame.origin[kz];
+        [x - shear_x * z, y - shear_y * z, z]
+    };
+    let [ax, ay, az] = vertex(0);
+    let [bx, by, bz] = vertex(1);
+    let [cx, cy, cz] = vertex(2);
+    let u = cx * by - cy * bx;
+    let v = ax * cy - ay * cx;
+    let w = bx * ay - by * ax;
+    let det = u + v + w;
+    let least = min(min(u, v), w);
+    let most = max(max(u, v), w);
+    let slack = PROJECTED_SLACK
+        * max(
+            max(max(ax.abs(), bx.abs()), cx.abs()),
+            max(max(ay.abs(), by.abs()), cy.abs()),
+        );
+    let bounded = min(min(ax, bx), cx) <= slack
+        && max(max(ax, bx), cx) >= -slack
+        && min(min(ay, by), cy) <= slack
+        && max(max(ay, by), cy) >= -slack;
+    let inv_det = 1.0 / det;
+    let weights = [u * inv_det, v * inv_det, w * inv_det];
+    Projected {
+        weights,
+        t: (weights[0] * az + weights[1] * bz + weights[2] * cz) * scale,
+        hit: (least >= 0.0 || most <= 0.0) && det != 0.0 && bounded,
+    }
+}
+
+/// As the processor's instruction: the second operand if either is NaN.
+#[inline(always)]
+fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// See [`min`].
+#[inline(always)]
+fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+traversal! { fn portable(itself, portable_boxes, portable_block, nothing) }
+
+fn itself(frame: &RayFrame) -> &RayFrame {
+    frame
+}
+
+fn nothing(_: &WideBvh, _: u32) {}
+
+/// A plane through an origin that moves along it gives 0 * inf = NaN, which `min` and `max` pass over: no constraint.
+#[inline(always)]
+fn portable_boxes(node: &WideNode, frame: &&RayFrame, limit: f32) -> (u32, [f32; 8]) {
+    let mut near = [frame.t_min; 8];
+    let mut far = [limit; 8];
+    for axis in 0..3 {
+        let near_row = &node.rows[frame.near_row[axis]];
+        let far_row = &node.rows[frame.near_row[axis] ^ 1];
+        let (origin, inverse) = (frame.origin[axis], frame.inv_direction[axis]);
+        for lane in 0..8 {
+            near[lane] = max((near_row[lane] - origin) * inverse, near[lane]);
+            far[lane] = min((far_row[lane] - origin) * inverse, far[lane]);
+        }
+    }
+    let mut mask = 0;
+    for lane in 0..8 {
+        mask |= u32::from(near[lane] <= far[lane] * BOX_MARGIN) << lane;
+    }
+    (mask, near)
+}
+
+#[inline(always)]
+fn portable_block(block: &TriangleBlock, frame: &&RayFrame, limit: f32) -> (u32, [f32; 8]) {
+    let mut mask = 0;
+    let mut distances = [0.0; 8];
+    for lane in 0..8 {
+        let projected = project(block, frame, lane);
+        let within = projected.t >= frame.t_min && projected.t <= limit;
+        mask |= u32::from(projected.hit && within) << lane;
+        distances[lane] = projected.t;
+    }
+    (mask, distances)
+}

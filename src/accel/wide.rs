@@ -1,0 +1,237 @@
+//! The CPU's tree: 8-wide nodes of f32 boxes, leaves of one or two blocks of eight triangles, collapsed from a BVH2 by dynamic programming
+//! (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017, section 3.1).
+
+use glam::Vec3;
+use obvhs::bvh2::Bvh2;
+
+/// High bit of a child word: the child is a leaf, the rest is first block << 3 | blocks - 1. Without it the word is a node index.
+pub(super) const LEAF: u32 = 1 << 31;
+
+/// Deepest tree that the larger traversal stack serves: each level leaves at most seven children waiting.
+pub(super) const MAX_LEVELS: usize = 73;
+
+const WIDTH: usize = 8;
+const MAX_LEAF_TRIANGLES: u32 = 16;
+/// Cost of a triangle block relative to a node.
+const BLOCK_COST: f32 = 0.3;
+
+/// Eight child boxes and what they hold. An empty slot has an inverted infinite box and points at the all-zero block.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct WideNode {
+    /// Low x, high x, low y, high y, low z, high z.
+    pub(super) rows: [[f32; WIDTH]; 6],
+    pub(super) children: [u32; WIDTH],
+}
+
+/// Eight triangles; unused lanes are zero triangles, which nothing hits.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct TriangleBlock {
+    /// Row 3 * vertex + axis.
+    pub(super) rows: [[f32; WIDTH]; 9],
+    pub(super) ids: [u32; WIDTH],
+}
+
+pub(super) struct WideBvh {
+    pub(super) nodes: Vec<WideNode>,
+    /// Block 0 is the all-zero one.
+    pub(super) blocks: Vec<TriangleBlock>,
+    /// Nodes on the longest path.
+    pub(super) levels: usize,
+}
+
+const EMPTY_NODE: WideNode = WideNode {
+    rows: {
+        let low = [f32::INFINITY; WIDTH];
+        let high = [f32::NEG_INFINITY; WIDTH];
+        [low, high, low, high, low, high]
+    },
+    children: [LEAF; WIDTH],
+};
+
+const ZERO_BLOCK: TriangleBlock = TriangleBlock {
+    rows: [[0.0; WIDTH]; 9],
+    ids: [0; WIDTH],
+};
+
+/// Cheapest ways to represent the subtree of a BVH2 node.
+#[derive(Clone, Copy)]
+struct Choice {
+    /// `cost[j]`: by at most j + 1 wide children.
+    cost: [f32; WIDTH],
+    /// `split[j]`: children for the left part << 4 | for the right part; 0 stands for one child.
+    split: [u8; WIDTH],
+    /// The same for the children of this node, should it become a wide node.
+    inner_split: u8,
+    /// As one child it is a leaf.
+    leaf: bool,
+    triangles: u32,
+}
+
+impl WideBvh {
+    pub(super) fn empty() -> WideBvh {
+        WideBvh {
+            nodes: vec![EMPTY_NODE],
+            blocks: vec![ZERO_BLOCK],
+            levels: 1,
+        }
+    }
+
+    /// `None` if the tree is deeper than [`MAX_LEVELS`].
+    pub(super) fn collapse(tree: &Bvh2, triangles: &[[Vec3; 3]], first_id: u32) -> Option<WideBvh> {
+        let choices = choose(tree);
+        let mut wide = WideBvh::empty();
+        wide.blocks.reserve(triangles.len() / 5);
+        let mut open = vec![(0u32, 0usize, 1usize)];
+        while let Some((source, target, level)) = open.pop() {
+            if level > MAX_LEVELS {
+                return None;
+            }
+            wide.levels = wide.levels.max(level);
+            let mut children = wide_children(tree, &choices, source);
+            children.sort_by(|&a, &b| {
+                let area = |n: u32| tree.nodes[n as usize].aabb().half_area();
+                area(b).total_cmp(&area(a))
+            });
+            for (slot, child) in children.into_iter().enumerate() {
+                let bounds = tree.nodes[child as usize].aabb();
+                let word = if choices[child as usize].leaf {
+                    wide.push_leaf(tree, triangles, first_id, child)
+                } else {
+                    let index = wide.nodes.len();
+                    wide.nodes.push(EMPTY_NODE);
+                    open.push((child, index, level + 1));
+                    index as u32
+                };
+                let node = &mut wide.nodes[target];
+                for axis in 0..3 {
+                    node.rows[2 * axis][slot] = bounds.min[axis];
+                    node.rows[2 * axis + 1][slot] = bounds.max[axis];
+                }
+                node.children[slot] = word;
+            }
+        }
+        Some(wide)
+    }
+
+    fn push_leaf(&mut self, tree: &Bvh2, triangles: &[[Vec3; 3]], first_id: u32, root: u32) -> u32 {
+        let first = self.blocks.len();
+        let mut count = 0;
+        let mut open = vec![root];
+        while let Some(index) = open.pop() {
+            let node = &tree.nodes[index as usize];
+            if !node.is_leaf() {
+                open.push(node.first_index + 1);
+                open.push(node.first_index);
+                continue;
+            }
+            let triangle = tree.primitive_indices[node.first_index as usize];
+            if count % WIDTH == 0 {
+                self.blocks.push(ZERO_BLOCK);
+            }
+            let block = &mut self.blocks[first + count / WIDTH];
+            let lane = count % WIDTH;
+            for (vertex, position) in triangles[triangle as usize].iter().enumerate() {
+                for axis in 0..3 {
+                    block.rows[3 * vertex + axis][lane] = position[axis];
+                }
+            }
+            block.ids[lane] = first_id + triangle;
+            count += 1;
+        }
+        LEAF | (first as u32) << 3 | (count.div_ceil(WIDTH) - 1) as u32
+    }
+}
+
+/// BVH2 nodes that become the children of the wide node made from `source`.
+fn wide_children(tree: &Bvh2, choices: &[Choice], source: u32) -> Vec<u32> {
+    let node = &tree.nodes[source as usize];
+    if node.is_leaf() {
+        return vec![source];
+    }
+    let mut children = Vec::with_capacity(WIDTH);
+    let halves = |first: u32, split: u8| [(first, split >> 4), (first + 1, split & 15)];
+    let mut open = Vec::from(halves(
+        node.first_index,
+        choices[source as usize].inner_split,
+    ));
+    while let Some((index, budget)) = open.pop() {
+        let split = choices[index as usize].split[budget as usize - 1];
+        if split == 0 {
+            children.push(index);
+        } else {
+            open.extend(halves(tree.nodes[index as usize].first_index, split));
+        }
+    }
+    children
+}
+
+/// Cheapest split of `budget` children between two subtrees.
+fn distribute(left: &Choice, right: &Choice, budget: usize) -> (f32, u8) {
+    let mut best = (f32::INFINITY, 0);
+    for k in 1..budget {
+        let cost = left.cost[k - 1] + right.cost[budget - k - 1];
+        if cost < best.0 {
+            best = (cost, (k << 4 | (budget - k)) as u8);
+        }
+    }
+    best
+}
+
+fn choose(tree: &Bvh2) -> Vec<Choice> {
+    let mut order = Vec::with_capacity(tree.nodes.len());
+    let mut open = vec![0u32];
+    while let Some(index) = open.pop() {
+        order.push(index);
+        let node = &tree.nodes[index as usize];
+        if !node.is_leaf() {
+            open.push(node.first_index);
+            open.push(node.first_index + 1);
+        }
+    }
+    let unset = Choice {
+        cost: [0.0; WIDTH],
+        split: [0; WIDTH],
+        inner_split: 0,
+        leaf: true,
+        triangles: 1,
+    };
+    let mut choices = vec![unset; tree.nodes.len()];
+    for &index in order.iter().rev() {
+        let node = &tree.nodes[index as usize];
+        let area = node.aabb().half_area();
+        if node.is_leaf() {
+            choices[index as usize].cost = [BLOCK_COST * area; WIDTH];
+            continue;
+        }
+        let left = &choices[node.first_index as usize];
+        let right = &choices[node.first_index as usize + 1];
+        let triangles = left.triangles + right.triangles;
+        let (inner_cost, inner_split) = distribute(left, right, WIDTH);
+        let as_node = area + inner_cost;
+        let as_leaf = if triangles <= MAX_LEAF_TRIANGLES {
+            BLOCK_COST * area * triangles.div_ceil(WIDTH as u32) as f32
+        } else {
+            f32::INFINITY
+        };
+        let mut choice = Choice {
+            inner_split,
+            leaf: as_leaf <= as_node && triangles <= MAX_LEAF_TRIANGLES,
+            triangles,
+            ..unset
+        };
+        choice.cost[0] = as_leaf.min(as_node);
+        for budget in 2..=WIDTH {
+            let (cost, split) = distribute(left, right, budget);
+            let fewer = budget - 2;
+            (choice.cost[budget - 1], choice.split[budget - 1]) = if cost < choice.cost[fewer] {
+                (cost, split)
+            } else {
+                (choice.cost[fewer], choice.split[fewer])
+            };
+        }
+        choices[index as usize] = choice;
+    }
+    choices
+}

@@ -1,0 +1,317 @@
+//! The film: sums over camera samples, a record a pixel.
+
+use crate::film::sums::{GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
+use glam::Vec3;
+
+/// What a pixel shows, known from the samples taken so far (design: background M = 0, virtual M = 1, edge between).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PixelKind {
+    Background,
+    Edge,
+    Virtual,
+    /// No sample was taken: nothing virtual can change this pixel.
+    Skipped,
+}
+
+/// How many pixels are of which kind; the four add up to the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct PixelCounts {
+    pub background: u64,
+    pub edge: u64,
+    #[serde(rename = "virtual")]
+    pub virtual_: u64,
+    pub skipped: u64,
+}
+
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+pub enum MergeError {
+    #[error("films of {0}x{1} and {2}x{3} pixels cannot be merged")]
+    Size(u32, u32, u32, u32),
+    #[error("one film has depth, normal and albedo planes, the other has none")]
+    Guides,
+    #[error("the sample ranges do not follow one another at pixel {pixel}: {first} and {second}")]
+    NotAdjacent {
+        pixel: usize,
+        /// "0..16"
+        first: String,
+        second: String,
+    },
+}
+
+/// Per-pixel sums of everything the composite and the output planes need, row-major from the top left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    pub width: u32,
+    pub height: u32,
+    /// Index of the first sample of every pixel: above 0 where this film holds a later range of a render's samples.
+    pub first_sample: u32,
+    pub pixels: Vec<PixelSums>,
+    /// Empty unless depth, normal and albedo were asked for.
+    pub guides: Vec<GuideSums>,
+}
+
+impl Film {
+    /// An empty film. Memory that no sample touches is not committed.
+    pub fn new(width: u32, height: u32, first_sample: u32, with_guides: bool) -> Self {
+        let count = width as usize * height as usize;
+        Self {
+            width,
+            height,
+            first_sample,
+            pixels: bytemuck::zeroed_vec(count),
+            guides: bytemuck::zeroed_vec(if with_guides { count } else { 0 }),
+        }
+    }
+
+    /// Adds the pixel's next sample.
+    pub fn add(&mut self, pixel: usize, sample: &Sample) {
+        let sums = &mut self.pixels[pixel];
+        let index = self.first_sample + sums.n;
+        sums.add(index, sample);
+        if let (Some(guide), Some(sums)) = (sample.guide, self.guides.get_mut(pixel)) {
+            guide_add(sums, guide.depth_m, guide.normal, guide.albedo);
+        }
+    }
+
+    /// Adds the real radiance of the pixel's sample number `first_sample + n_real`.
+    pub fn add_real(&mut self, pixel: usize, is_virtual: bool, real: Vec3) {
+        let sums = &mut self.pixels[pixel];
+        let index = self.first_sample + sums.n_real;
+        pixel_add_real(sums, index, is_virtual, real);
+    }
+
+    pub fn kind(&self, pixel: usize) -> PixelKind {
+        kind(&self.pixels[pixel])
+    }
+
+    /// An edge pixel whose real radiance is not known for all its samples; they have to be replayed, from index
+    /// `first_sample + n_real` on, before its composite is Eq. 4.
+    pub fn needs_real(&self, pixel: usize) -> bool {
+        let sums = &self.pixels[pixel];
+        kind(sums) == PixelKind::Edge && sums.n_real < sums.n
+    }
+
+    pub fn counts(&self) -> PixelCounts {
+        let mut counts = PixelCounts::default();
+        for sums in &self.pixels {
+            match kind(sums) {
+                PixelKind::Background => counts.background += 1,
+                PixelKind::Edge => counts.edge += 1,
+                PixelKind::Virtual => counts.virtual_ += 1,
+                PixelKind::Skipped => counts.skipped += 1,
+            }
+        }
+        counts
+    }
+
+    /// Samples left out because they were not finite.
+    pub fn non_finite_samples(&self) -> u64 {
+        self.pixels.iter().map(|p| u64::from(p.non_finite)).sum()
+    }
+
+    /// Pixel and sample index of the first of them, to render just that one again.
+    pub fn first_non_finite(&self) -> Option<(usize, u32)> {
+        self.pixels
+            .iter()
+            .position(|p| p.non_finite > 0)
+            .map(|pixel| (pixel, self.pixels[pixel].first_non_finite))
+    }
+
+    /// Adds a film that holds the samples just before or just after this one's, of the same render (same scene, seed, sampler
+    /// and total). Edge pixels may need real samples replayed afterwards: see [`Film::needs_real`].
+    ///
+    /// # Errors
+    /// If sizes or planes differ, or the ranges leave a gap or overlap; this film is then unchanged.
+    pub fn merge(&mut self, other: &Film) -> Result<(), MergeError> {
+        if (self.width, self.height) != (other.width, other.height) {
+            return Err(MergeError::Size(
+                self.width,
+                self.height,
+                other.width,
+                other.height,
+            ));
+        }
+        if self.guides.len() != other.guides.len() {
+            return Err(MergeError::Guides);
+        }
+        if other.first_sample < self.first_sample {
+            let mut merged = other.clone();
+            merged.merge(self)?;
+            *self = merged;
+            return Ok(());
+        }
+        for (pixel, (a, b)) in self.pixels.iter().zip(&other.pixels).enumerate() {
+            // A pixel without samples in both films is skipped in the whole render.
+            let skipped = a.n == 0 && b.n == 0;
+            if !skipped && self.first_sample + a.n != other.first_sample {
+                let range =
+                    |film: &Film, n| format!("{}..{}", film.first_sample, film.first_sample + n);
+                return Err(MergeError::NotAdjacent {
+                    pixel,
+                    first: range(self, a.n),
+                    second: range(other, b.n),
+                });
+            }
+        }
+        for (a, b) in self.pixels.iter_mut().zip(&other.pixels) {
+            a.merge(b);
+        }
+        for (a, b) in self.guides.iter_mut().zip(&other.guides) {
+            a.merge(b);
+        }
+        Ok(())
+    }
+}
+
+fn kind(sums: &PixelSums) -> PixelKind {
+    match (sums.n, sums.m) {
+        (0, _) => PixelKind::Skipped,
+        (_, 0) => PixelKind::Background,
+        (n, m) if n == m => PixelKind::Virtual,
+        _ => PixelKind::Edge,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::sums::Guide;
+
+    fn noise(i: u32) -> f32 {
+        let mut x = i.wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
+        x ^= x >> 16;
+        x = x.wrapping_mul(0x7feb_352d);
+        x ^= x >> 15;
+        (x >> 8) as f32 / 16_777_216.0
+    }
+
+    fn sample(pixel: u32, index: u32) -> Sample {
+        let at = |d| noise(pixel * 7919 + index * 13 + d);
+        Sample {
+            is_virtual: at(0) < 0.4 + 0.2 * pixel as f32,
+            contribution: Vec3::new(at(1), at(2) * 100.0, at(3) - 0.5),
+            real: Some(Vec3::new(at(4), at(5), at(6))),
+            guide: (at(7) < 0.9).then(|| Guide {
+                depth_m: 1.0 + at(8),
+                normal: Vec3::Y,
+                albedo: Vec3::splat(at(9)),
+            }),
+        }
+    }
+
+    fn render(range: std::ops::Range<u32>) -> Film {
+        let mut film = Film::new(3, 1, range.start, true);
+        for pixel in 0..3 {
+            for index in range.clone() {
+                film.add(pixel, &sample(pixel as u32, index));
+            }
+        }
+        film
+    }
+
+    /// Means of every channel as f32, to be compared in units in the last place.
+    fn means(film: &Film) -> Vec<f32> {
+        let mut out = Vec::new();
+        for (p, g) in film.pixels.iter().zip(&film.guides) {
+            for sum in [p.m_im, p.diff, p.m_ir, p.r_ir, p.sq, g.normal, g.albedo] {
+                out.extend((sum.value() / f64::from(p.n)).as_vec3().to_array());
+            }
+            out.push((g.depth() / f64::from(g.hits)) as f32);
+        }
+        out
+    }
+
+    fn worst_ulp(a: &[f32], b: &[f32]) -> u32 {
+        let key = |x: f32| {
+            let bits = x.to_bits() as i32;
+            i64::from(if bits < 0 { i32::MIN - bits } else { bits })
+        };
+        a.iter()
+            .zip(b)
+            .map(|(&a, &b)| (key(a) - key(b)).unsigned_abs() as u32)
+            .max()
+            .unwrap_or(0)
+    }
+
+    #[test]
+    fn ranges_merged_equal_one_run_within_2_ulp() {
+        let whole = render(0..20_000);
+        for cuts in [vec![0, 1, 20_000], vec![0, 7_001, 13_333, 20_000]] {
+            let parts: Vec<Film> = cuts.windows(2).map(|w| render(w[0]..w[1])).collect();
+            let mut merged = parts[parts.len() - 1].clone();
+            for part in parts[..parts.len() - 1].iter().rev() {
+                merged.merge(part).unwrap();
+            }
+            assert!(worst_ulp(&means(&whole), &means(&merged)) <= 2);
+            for (a, b) in whole.pixels.iter().zip(&merged.pixels) {
+                assert_eq!((a.n, a.m, a.n_real), (b.n, b.m, b.n_real));
+            }
+        }
+        let other = render(0..19_999);
+        assert!(
+            worst_ulp(&means(&whole), &means(&other)) > 2,
+            "control: one sample fewer shows"
+        );
+    }
+
+    #[test]
+    fn a_gap_in_the_real_pass_is_replayed() {
+        let mut early = render(0..8);
+        for p in &mut early.pixels {
+            (p.m_ir, p.r_ir, p.n_real) = Default::default();
+        }
+        early.merge(&render(8..16)).unwrap();
+        for pixel in 0..3 {
+            assert!(early.needs_real(pixel));
+            assert_eq!(early.pixels[pixel].n_real, 0);
+            for index in 0..16 {
+                let s = sample(pixel as u32, index);
+                early.add_real(pixel, s.is_virtual, s.real.unwrap());
+            }
+            assert!(!early.needs_real(pixel));
+        }
+        assert!(worst_ulp(&means(&early), &means(&render(0..16))) <= 2);
+    }
+
+    #[test]
+    fn ranges_that_do_not_fit_are_refused() {
+        let mut film = render(0..4);
+        let before = film.clone();
+        assert!(matches!(
+            film.merge(&render(5..8)),
+            Err(MergeError::NotAdjacent { pixel: 0, .. })
+        ));
+        assert!(film.merge(&render(3..8)).is_err());
+        assert!(matches!(
+            film.merge(&Film::new(1, 3, 4, true)),
+            Err(MergeError::Size(..))
+        ));
+        assert_eq!(
+            film.merge(&Film::new(3, 1, 4, false)),
+            Err(MergeError::Guides)
+        );
+        assert_eq!(film, before);
+    }
+
+    #[test]
+    fn kinds_follow_the_mask() {
+        let mut film = Film::new(4, 1, 0, false);
+        for (pixel, mask) in [(0, [false, false]), (1, [false, true]), (2, [true, true])] {
+            for is_virtual in mask {
+                let s = Sample {
+                    is_virtual,
+                    ..sample(0, 0)
+                };
+                film.add(pixel, &s);
+            }
+        }
+        let expected = PixelCounts {
+            background: 1,
+            edge: 1,
+            virtual_: 1,
+            skipped: 1,
+        };
+        assert_eq!(film.counts(), expected);
+        assert_eq!(film.kind(3), PixelKind::Skipped);
+    }
+}

@@ -1,0 +1,288 @@
+//! Composes shaders: the embedded modules of `shaders/`, WESL imports and `@if(feature)`, unused declarations left out.
+//!
+//! Names of imported items become `module_item`, so `package::math::hash_u32` is `math_hash_u32` in the emitted WGSL.
+
+use std::borrow::Cow;
+
+use wesl::{CompileOptions, Feature, Mangler, ModulePath, VirtualResolver, Wesl};
+
+use super::GpuError;
+use crate::packed::{self, PackedScene};
+
+/// The embedded modules: name and source.
+pub const MODULES: &[(&str, &str)] = &[
+    ("bindings", include_str!("../../shaders/bindings.wgsl")),
+    ("cones", include_str!("../../shaders/cones.wgsl")),
+    (
+        "contribution",
+        include_str!("../../shaders/contribution.wgsl"),
+    ),
+    (
+        "environment",
+        include_str!("../../shaders/environment.wgsl"),
+    ),
+    ("estimator", include_str!("../../shaders/estimator.wgsl")),
+    ("film", include_str!("../../shaders/film.wgsl")),
+    ("kernels", include_str!("../../shaders/kernels.wgsl")),
+    ("lanes", include_str!("../../shaders/lanes.wgsl")),
+    ("lens", include_str!("../../shaders/lens.wgsl")),
+    ("lights", include_str!("../../shaders/lights.wgsl")),
+    ("math", include_str!("../../shaders/math.wgsl")),
+    ("request", include_str!("../../shaders/request.wgsl")),
+    ("sampler", include_str!("../../shaders/sampler.wgsl")),
+    ("state", include_str!("../../shaders/state.wgsl")),
+    ("trace", include_str!("../../shaders/trace.wgsl")),
+    ("vertex", include_str!("../../shaders/vertex.wgsl")),
+];
+
+macro_rules! features {
+    ($($(#[$doc:meta])* $name:ident,)*) => {
+        /// What a scene uses; the `@if(...)` flags of the shaders. What is off is absent from the emitted code.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        pub struct Features {
+            $($(#[$doc])* pub $name: bool,)*
+        }
+
+        impl Features {
+            /// Every flag by its name in the shaders.
+            pub fn flags(&self) -> Vec<(&'static str, bool)> {
+                vec![$((stringify!($name), self.$name),)*]
+            }
+
+            /// With one flag the other way round; unchanged if there is none of that name.
+            #[must_use]
+            pub fn toggled(mut self, name: &str) -> Self {
+                match name {
+                    $(stringify!($name) => self.$name = !self.$name,)*
+                    _ => {}
+                }
+                self
+            }
+
+            /// Everything on: the largest variant.
+            pub fn all() -> Self {
+                Self { $($name: true,)* }
+            }
+        }
+    };
+}
+
+features! {
+    /// Some material refers to a texture.
+    textures,
+    /// Alpha mask or blend.
+    alpha,
+    transmission,
+    clearcoat,
+    /// A lat-long map rather than a constant.
+    environment_map,
+    /// Quads and emissive triangles.
+    area_lights,
+    /// Point, spot and directional lights.
+    delta_lights,
+    /// Aperture radius above 0.
+    lens,
+    /// max_bounces above 1.
+    multi_bounce,
+    /// Some real material takes its albedo from the photograph.
+    photo_albedo,
+    normal_maps,
+    /// The `paper` estimator instead of `direct`.
+    paper,
+    /// Some material has a GGX lobe.
+    rough_specular,
+}
+
+impl Features {
+    /// What `scene` needs, never less.
+    pub fn for_scene(scene: &PackedScene) -> Self {
+        let material = |test: &dyn Fn(&packed::Material) -> bool| scene.materials.iter().any(test);
+        let flag = |bits: u32| material(&|m| m.flags & bits != 0);
+        let light = |kinds: &[u32]| scene.lights.iter().any(|l| kinds.contains(&l.kind));
+        let no_lobe =
+            packed::MATERIAL_LAMBERTIAN | packed::MATERIAL_UNLIT | packed::MATERIAL_QUAD_LIGHT;
+        Self {
+            textures: flag(packed::MATERIAL_TEXTURED),
+            alpha: flag(packed::MATERIAL_ALPHA_MASK | packed::MATERIAL_ALPHA_BLEND),
+            transmission: material(&|m| m.transmission > 0.0),
+            clearcoat: material(&|m| m.clearcoat > 0.0),
+            environment_map: scene.frame.env_width > 0,
+            area_lights: light(&[packed::LIGHT_QUAD, packed::LIGHT_TRIANGLE]),
+            delta_lights: light(&[
+                packed::LIGHT_POINT,
+                packed::LIGHT_SPOT,
+                packed::LIGHT_DIRECTIONAL,
+            ]),
+            lens: scene.frame.aperture_radius > 0.0,
+            multi_bounce: scene.frame.max_bounces > 1,
+            photo_albedo: flag(packed::MATERIAL_PHOTO_ALBEDO),
+            normal_maps: material(&|m| {
+                m.normal_texture != packed::NONE || m.clearcoat_normal_texture != packed::NONE
+            }),
+            paper: scene.frame.estimator == 1,
+            rough_specular: material(&|m| m.flags & no_lobe == 0),
+        }
+    }
+}
+
+/// `package::math::hash_u32` -> `math_hash_u32`.
+struct ModuleItemMangler;
+
+impl Mangler for ModuleItemMangler {
+    fn mangle(&self, path: &ModulePath, item: &str) -> String {
+        match path.components.last() {
+            Some(module) => format!("{module}_{item}"),
+            None => item.to_owned(),
+        }
+    }
+}
+
+/// A set of modules to compose from: the embedded ones, some of them replaced or joined by others.
+pub struct Composer {
+    modules: Vec<(String, Cow<'static, str>)>,
+}
+
+impl Default for Composer {
+    fn default() -> Self {
+        Self {
+            modules: MODULES
+                .iter()
+                .map(|&(name, source)| (name.to_owned(), Cow::Borrowed(source)))
+                .collect(),
+        }
+    }
+}
+
+impl Composer {
+    /// Adds the module `package::NAME`, in place of the embedded one of that name if there is one.
+    pub fn with_module(mut self, name: &str, source: impl Into<Cow<'static, str>>) -> Self {
+        self.modules.retain(|(present, _)| present != name);
+        self.modules.push((name.to_owned(), source.into()));
+        self
+    }
+
+    /// WGSL of the module `package::ROOT` reduced to `entry_point` and what it reaches.
+    ///
+    /// # Errors
+    /// [`GpuError::Shader`] for a syntax error, an unknown import or an `@if` flag that [`Features`] does not have.
+    pub fn compose(
+        &self,
+        root: &str,
+        entry_point: &str,
+        features: &Features,
+    ) -> Result<String, GpuError> {
+        let shader_error = |message: String| GpuError::Shader {
+            entry_point: entry_point.to_owned(),
+            message,
+        };
+        let mut resolver = VirtualResolver::new();
+        let path = |name: &str| {
+            format!("package::{name}")
+                .parse::<ModulePath>()
+                .map_err(|error| shader_error(error.to_string()))
+        };
+        for (name, source) in &self.modules {
+            resolver.add_module(path(name)?, Cow::Borrowed(source));
+        }
+        let mut compiler = Wesl::new_barebones().set_custom_resolver(resolver);
+        compiler.set_options(CompileOptions {
+            imports: true,
+            condcomp: true,
+            strip: true,
+            lazy: true,
+            // naga validates what comes out, wgpu once more when the module is made.
+            validate: false,
+            keep: Some(vec![entry_point.to_owned()]),
+            features: wesl::Features {
+                default: Feature::Error,
+                flags: features
+                    .flags()
+                    .into_iter()
+                    .map(|(name, on)| (name.to_owned(), on.into()))
+                    .collect(),
+            },
+            ..CompileOptions::default()
+        });
+        compiler.use_sourcemap(true);
+        compiler.set_custom_mangler(ModuleItemMangler);
+        compiler
+            .compile(&path(root)?)
+            .map(|result| result.to_string())
+            .map_err(|error| shader_error(error.to_string()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROOT: &str = "
+import package::bindings::{frame, lights, NONE};
+import package::extra::helper;
+@if(lens) fn radius() -> f32 { return frame.aperture_radius; }
+@else fn radius() -> f32 { return 0.0; }
+fn unused() -> u32 { return lights[0].kind; }
+@compute @workgroup_size(1) fn first() { var x = radius() + helper(); @if(paper) { x += 7.25; } _ = x; }
+@compute @workgroup_size(1) fn second() { let light = lights[0].kind; _ = light + NONE; }
+";
+
+    fn compose(entry_point: &str, features: &Features) -> String {
+        Composer::default()
+            .with_module(
+                "extra",
+                "fn helper() -> f32 { let frame = 3.5; return frame; }",
+            )
+            .with_module("root", ROOT)
+            .compose("root", entry_point, features)
+            .expect("composes")
+    }
+
+    fn binding_names(wgsl: &str) -> Vec<String> {
+        crate::gpu::kernel::reflect_bindings(wgsl)
+            .expect("valid")
+            .into_iter()
+            .map(|binding| binding.name)
+            .collect()
+    }
+
+    #[test]
+    fn only_what_an_entry_point_reaches_is_emitted() {
+        let lens = Features {
+            lens: true,
+            ..Features::default()
+        };
+        let first = compose("first", &lens);
+        assert_eq!(binding_names(&first), ["bindings_frame"], "{first}");
+        assert!(
+            first.contains("extra_helper") && !first.contains("second"),
+            "{first}"
+        );
+        let second = compose("second", &lens);
+        assert_eq!(binding_names(&second), ["bindings_lights"], "{second}");
+    }
+
+    #[test]
+    fn a_feature_that_is_off_leaves_no_trace() {
+        let off = compose("first", &Features::default());
+        assert!(
+            binding_names(&off).is_empty() && !off.contains("7.25"),
+            "{off}"
+        );
+        let on = compose("first", &Features::all());
+        assert!(
+            on.contains("aperture_radius") && on.contains("7.25"),
+            "{on}"
+        );
+    }
+
+    #[test]
+    fn an_unknown_feature_is_an_error() {
+        let composed = Composer::default()
+            .with_module(
+                "root",
+                "@if(lense) const x = 1; @compute @workgroup_size(1) fn main() { }",
+            )
+            .compose("root", "main", &Features::default());
+        assert!(composed.is_err_and(|error| error.to_string().contains("lense")));
+    }
+}

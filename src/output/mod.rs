@@ -1,0 +1,28 @@
+//! Pictures to files: PNG and multilayer EXR, written beside the target and renamed, so that no broken picture is ever left.
+
+mod exr_file;
+mod png_file;
+mod target;
+
+pub use exr_file::{Metadata, write_exr};
+pub use png_file::{PngBits, write_png};
+pub(crate) use target::check_writable;
+pub use target::{Format, Target, write_text};
+
+use std::path::PathBuf;
+
+/// A picture or report could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    #[error("{}: the name must end in .png or .exr", path.display())]
+    Extension { path: PathBuf },
+    #[error("{}: is a folder or another special file, not a picture", path.display())]
+    NotAFile { path: PathBuf },
+    #[error("{}: cannot be written: {source}", path.display())]
+    Io {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("{}: cannot be encoded: {message}", path.display())]
+    Encode { path: PathBuf, message: String },
+}

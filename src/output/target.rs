@@ -1,0 +1,192 @@
+//! Output files, checked before the work begins and replaced whole at the end.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::OutputError;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    Png,
+    Exr,
+}
+
+/// A picture file that can be written, as far as can be known without writing it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Target {
+    path: PathBuf,
+    format: Format,
+}
+
+impl Target {
+    /// Checks the extension and that a file can be made in the folder.
+    ///
+    /// # Errors
+    /// Another extension, a missing or read-only folder, or a target that is no regular file.
+    pub fn picture(path: &Path) -> Result<Self, OutputError> {
+        let extension = path.extension().map(|e| e.to_ascii_lowercase());
+        let format = match extension.as_ref().and_then(|e| e.to_str()) {
+            Some("png") => Format::Png,
+            Some("exr") => Format::Exr,
+            _ => {
+                return Err(OutputError::Extension { path: path.into() });
+            }
+        };
+        check_writable(path)?;
+        Ok(Self {
+            path: path.into(),
+            format,
+        })
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub fn format(&self) -> Format {
+        self.format
+    }
+}
+
+/// Fails now if [`write_atomically`] would fail later.
+pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
+    temporary_beside(path).map(|_| ())
+}
+
+/// Replaces the file at `path` by `text`.
+///
+/// # Errors
+/// If the file cannot be written; what was there before then still is.
+pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
+    write_atomically(path, |file| {
+        file.write_all(text.as_bytes())
+            .map_err(|source| io_error(path, source))
+    })
+}
+
+/// Lets `write` fill a temporary file in the same folder, then renames it to `path`.
+pub(super) fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&File>) -> Result<(), OutputError>,
+) -> Result<(), OutputError> {
+    let (temporary, target) = temporary_beside(path)?;
+    let mut writer = BufWriter::new(temporary.as_file());
+    write(&mut writer)?;
+    writer.flush().map_err(|source| io_error(path, source))?;
+    drop(writer);
+    temporary
+        .persist(target)
+        .map_err(|e| io_error(path, e.error))?;
+    Ok(())
+}
+
+fn io_error(path: &Path, source: io::Error) -> OutputError {
+    OutputError::Io {
+        path: path.into(),
+        source,
+    }
+}
+
+/// An empty temporary file in the folder of `path`, and the path to rename it to (links resolved, so that they stay links).
+fn temporary_beside(path: &Path) -> Result<(tempfile::NamedTempFile, PathBuf), OutputError> {
+    let target = match path.metadata() {
+        Ok(metadata) if !metadata.is_file() => {
+            return Err(OutputError::NotAFile { path: path.into() });
+        }
+        Ok(_) => path.canonicalize().map_err(|e| io_error(path, e))?,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => path.to_path_buf(),
+        Err(e) => return Err(io_error(path, e)),
+    };
+    let folder = match target.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".mixray-").suffix(".tmp");
+    #[cfg(unix)]
+    {
+        // tempfile's default of 0600 would leave the picture unreadable for others; the umask still applies.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let temporary = builder
+        .tempfile_in(folder)
+        .map_err(|source| io_error(path, source))?;
+    Ok((temporary, target))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entries(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        write_text(&path, "old").unwrap();
+        let failed = write_atomically(&path, |file| {
+            file.write_all(b"half a pict").unwrap();
+            file.flush().unwrap();
+            assert_eq!(
+                entries(folder.path()).len(),
+                2,
+                "control: the half-written file is there"
+            );
+            Err(OutputError::Encode {
+                path: path.clone(),
+                message: "stop".into(),
+            })
+        });
+        assert!(failed.is_err());
+        assert_eq!(entries(folder.path()), ["a.png"]);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+        write_text(&path, "new").unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "new");
+    }
+
+    #[test]
+    fn bad_targets_are_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        assert!(matches!(
+            Target::picture(&at("a.jpg")),
+            Err(OutputError::Extension { .. })
+        ));
+        assert!(matches!(
+            Target::picture(&at("missing/a.png")),
+            Err(OutputError::Io { .. })
+        ));
+        std::fs::create_dir(at("b.exr")).unwrap();
+        assert!(matches!(
+            Target::picture(&at("b.exr")),
+            Err(OutputError::NotAFile { .. })
+        ));
+        assert_eq!(Target::picture(&at("A.PNG")).unwrap().format(), Format::Png);
+        assert_eq!(entries(folder.path()), ["b.exr"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link() {
+        let folder = tempfile::tempdir().unwrap();
+        let (real, link) = (
+            folder.path().join("real.png"),
+            folder.path().join("link.png"),
+        );
+        write_text(&real, "old").unwrap();
+        std::os::unix::fs::symlink("real.png", &link).unwrap();
+        write_text(&link, "new").unwrap();
+        assert!(link.symlink_metadata().unwrap().is_symlink());
+        assert_eq!(std::fs::read_to_string(&real).unwrap(), "new");
+    }
+}

@@ -1,0 +1,204 @@
+//! `[camera]` and `[lens]`.
+
+use crate::camera::lens::undistort;
+
+use super::error::Result;
+use super::image_file::{MAX_PIXELS, MAX_SIDE_PX};
+use super::pose::read_camera_pose;
+use super::reader::{Node, Table};
+use super::{Aperture, Camera, Lens, Photo};
+
+const CAMERA_KEYS: &[&str] = &[
+    "width",
+    "height",
+    "fx",
+    "fy",
+    "vertical_fov_deg",
+    "cx",
+    "cy",
+    "distortion",
+    "world_from_camera",
+    "position",
+    "look_at",
+    "up",
+];
+
+const LENS_KEYS: &[&str] = &[
+    "aperture_radius_m",
+    "f_number",
+    "focal_length_mm",
+    "focus_distance_m",
+    "aperture",
+    "blade_rotation_deg",
+];
+
+pub(super) fn read_camera(root: &Table, photo: Option<&Photo>) -> Result<Camera> {
+    let Some(table) = root.table("camera", "[camera]", CAMERA_KEYS)? else {
+        return Err(root.error(
+            "the scene has no [camera]",
+            "a table [camera] with `fx` and `fy` or `vertical_fov_deg`",
+            "add it",
+        ));
+    };
+    let width = read_side(&table, "width", photo.map(|photo| photo.width))?;
+    let height = read_side(&table, "height", photo.map(|photo| photo.height))?;
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(table.error(
+            format!("the camera has {width} x {height} pixels"),
+            format!("at most {MAX_PIXELS}"),
+            "lower `width` or `height`",
+        ));
+    }
+    let (fx, fy) = read_focal_lengths(&table, f64::from(height))?;
+    let half = |side: u32| f64::from(side) * 0.5;
+    let camera = Camera {
+        width,
+        height,
+        fx,
+        fy,
+        cx: table.optional("cx", Node::finite)?.unwrap_or(half(width)),
+        cy: table.optional("cy", Node::finite)?.unwrap_or(half(height)),
+        distortion: table
+            .optional("distortion", |node| node.vector::<5>())?
+            .unwrap_or_default(),
+        world_from_camera: read_camera_pose(&table)?,
+    };
+    table.optional("distortion", |node| check_distortion(node, &camera))?;
+    Ok(camera)
+}
+
+/// Every ray starts by inverting the distortion. The inversion walks from the centre outward, so the border is the hardest part;
+/// the grid is for a centre outside the picture.
+fn check_distortion(node: &Node, camera: &Camera) -> Result<()> {
+    const GRID: u32 = 32;
+    let (width, height) = (camera.width, camera.height);
+    let across = (0..=width).flat_map(|x| [(x, 0), (x, height)]);
+    let down = (0..=height).flat_map(|y| [(0, y), (width, y)]);
+    let border = across
+        .chain(down)
+        .map(|(x, y)| (f64::from(x), f64::from(y)));
+    let fraction = |i: u32, side: u32| f64::from(side) * f64::from(i) / f64::from(GRID);
+    let grid = (1..GRID)
+        .flat_map(|j| (1..GRID).map(move |i| (i, j)))
+        .map(|(i, j)| (fraction(i, width), fraction(j, height)));
+    for (x, y) in border.chain(grid) {
+        undistort(camera, x, y).map_err(|problem| {
+            node.error(
+                problem,
+                "coefficients (OpenCV's k1 k2 p1 p2 k3) that reach every pixel",
+                "correct them or `fx` and `fy`",
+            )
+        })?;
+    }
+    Ok(())
+}
+
+fn read_side(table: &Table, key: &str, photo_side: Option<u32>) -> Result<u32> {
+    let Some(photo_side) = photo_side else {
+        return table.required(key, &format!("{key} = 640"), |node| {
+            node.integer(1, MAX_SIDE_PX)
+        });
+    };
+    table
+        .optional(key, |node| {
+            let side = node.integer(1, MAX_SIDE_PX)?;
+            if side == photo_side {
+                return Ok(side);
+            }
+            Err(node.error(
+                format!("`{key}` is {side} but the photograph's is {photo_side}"),
+                "the photograph's size",
+                "remove `width` and `height` and scale the intrinsics",
+            ))
+        })
+        .map(|side| side.unwrap_or(photo_side))
+}
+
+/// Pixels. One of `fx` and `fy` alone means square pixels.
+fn read_focal_lengths(table: &Table, height: f64) -> Result<(f64, f64)> {
+    table.refuse_both("fx", "vertical_fov_deg")?;
+    table.refuse_both("fy", "vertical_fov_deg")?;
+    let fx = table.optional("fx", Node::positive)?;
+    let fy = table.optional("fy", Node::positive)?;
+    let from_fov = table.optional("vertical_fov_deg", |node| {
+        let expected = "degrees above 0 and below 180";
+        // Beyond these the focal length leaves the range in which f32 can divide by it.
+        let fov = node.number(expected, |fov| (1e-4..=179.9999).contains(&fov))?;
+        Ok(height * 0.5 / (fov.to_radians() * 0.5).tan())
+    })?;
+    match (fx.or(fy).or(from_fov), fy.or(fx).or(from_fov)) {
+        (Some(fx), Some(fy)) => Ok((fx, fy)),
+        _ => Err(table.error(
+            "[camera] lacks a focal length",
+            "`fx` and `fy` in pixels, or `vertical_fov_deg`",
+            "add it",
+        )),
+    }
+}
+
+pub(super) fn read_lens(root: &Table) -> Result<Lens> {
+    let pinhole = Lens {
+        aperture_radius_m: 0.0,
+        focus_distance_m: f64::INFINITY,
+        aperture: Aperture::Disc,
+        blade_rotation_deg: 0.0,
+    };
+    let Some(table) = root.table("lens", "[lens]", LENS_KEYS)? else {
+        return Ok(pinhole);
+    };
+    let aperture_radius_m = read_aperture_radius(&table)?;
+    let focus = table.optional("focus_distance_m", Node::positive_or_infinite)?;
+    if focus.is_none() && aperture_radius_m > 0.0 {
+        return Err(table.error(
+            "[lens] lacks `focus_distance_m`",
+            "`focus_distance_m = 1.2` in metres, or inf",
+            "add it",
+        ));
+    }
+    Ok(Lens {
+        aperture_radius_m,
+        focus_distance_m: focus.unwrap_or(pinhole.focus_distance_m),
+        aperture: table
+            .optional("aperture", read_aperture)?
+            .unwrap_or(pinhole.aperture),
+        blade_rotation_deg: table
+            .optional("blade_rotation_deg", Node::finite)?
+            .unwrap_or(0.0),
+    })
+}
+
+fn read_aperture_radius(table: &Table) -> Result<f64> {
+    table.refuse_both("aperture_radius_m", "f_number")?;
+    table.refuse_both("aperture_radius_m", "focal_length_mm")?;
+    let radius = table.optional("aperture_radius_m", Node::not_negative)?;
+    let f_number = table.optional("f_number", Node::positive)?;
+    let focal_length_mm = table.optional("focal_length_mm", Node::positive)?;
+    match (radius, f_number, focal_length_mm) {
+        (Some(radius), ..) => Ok(radius),
+        (None, None, None) => Ok(0.0),
+        (None, Some(f_number), Some(focal_length_mm)) => Ok(focal_length_mm / (2000.0 * f_number)),
+        (None, f_number, _) => {
+            let (given, missing) = match f_number {
+                Some(_) => ("f_number", "focal_length_mm"),
+                None => ("focal_length_mm", "f_number"),
+            };
+            Err(table.error(
+                format!("[lens] has `{given}` without `{missing}`"),
+                "both, or `aperture_radius_m`",
+                format!("add `{missing}`"),
+            ))
+        }
+    }
+}
+
+fn read_aperture(node: &Node) -> Result<Aperture> {
+    let expected = "\"disc\", \"square\", or a number of blades from 3 to 64";
+    if !node.is_string() {
+        return Ok(Aperture::Blades(node.integer_described(3, 64, expected)?));
+    }
+    match node.string()? {
+        "disc" => Ok(Aperture::Disc),
+        "square" => Ok(Aperture::Square),
+        _ => Err(node.impossible(expected)),
+    }
+}

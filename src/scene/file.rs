@@ -1,0 +1,106 @@
+//! From the text of a scene file to a [`Scene`].
+
+use std::path::Path;
+
+use toml::de::DeTable;
+
+use super::Scene;
+use super::camera::{read_camera, read_lens};
+use super::environment::read_environment;
+use super::error::{Result, SceneError, Source};
+use super::light::read_lights;
+use super::object::ObjectReader;
+use super::photo::read_photo;
+use super::reader::Table;
+use super::settings::read_settings;
+
+const TABLES: &[&str] = &[
+    "photo",
+    "camera",
+    "lens",
+    "environment",
+    "light",
+    "real",
+    "virtual",
+    "render",
+    "shutter",
+    "noise",
+    "antialias",
+    "motion_blur",
+    "cartoon",
+];
+
+/// Known to the format; rendering without them would silently give another picture than the one asked for.
+const NOT_APPLIED: &[&str] = &["shutter", "noise", "antialias", "motion_blur", "cartoon"];
+
+/// Reads a scene file (TOML) and everything it names.
+///
+/// What comes back is finite, in range and refers only to things that exist. Paths in the file are relative to its folder.
+///
+/// # Errors
+///
+/// [`SceneError`] names the file, line and column of the first thing that cannot be used, what was expected and how to mend it: bad
+/// TOML, unknown keys, wrong types, impossible values, missing or broken files.
+pub fn load(path: &Path) -> std::result::Result<Scene, SceneError> {
+    let bytes = std::fs::read(path).map_err(|error| SceneError::Unreadable {
+        path: path.to_path_buf(),
+        reason: error.to_string(),
+    })?;
+    read_scene(&Source::new(path, bytes)?)
+}
+
+pub(super) fn read_scene(source: &Source) -> Result<Scene> {
+    let document = DeTable::parse(&source.text).map_err(|error| {
+        let offset = error.span().map_or(0, |span| span.start);
+        let message = match error.message().split_once(", expected ") {
+            Some((problem, expected)) => format!("{problem}; expected {expected}"),
+            None => format!("{}; expected valid TOML", error.message()),
+        };
+        source.error(offset, format!("{message}; mend the TOML here"))
+    })?;
+    let root = Table::root(source, document.get_ref());
+    root.refuse_unknown(TABLES)?;
+    for table in NOT_APPLIED {
+        let message = format!(
+            "[{table}] is not applied by this version; expected a scene without it; remove the table"
+        );
+        if let Some(error) = root.key_error(table, &message) {
+            return Err(error);
+        }
+    }
+    let mut warnings = Vec::new();
+    let (photo, exposure) = read_photo(&root, &mut warnings)?;
+    let settings = read_settings(&root, exposure)?;
+    let camera = read_camera(&root, photo.as_ref())?;
+    let lens = read_lens(&root)?;
+    let environment = read_environment(&root, &mut warnings)?;
+    let mut lights = read_lights(&root)?;
+    let reader = ObjectReader::new(photo.is_some(), &mut warnings);
+    let (objects, mesh_lights) = reader.read_all(&root)?;
+    lights.extend(mesh_lights);
+    Ok(Scene {
+        name: scene_name(&source.path),
+        path: source.path.clone(),
+        photo,
+        camera,
+        lens,
+        environment,
+        lights,
+        objects,
+        settings,
+        warnings,
+    })
+}
+
+/// The name of the folder that holds the file, or else of the file.
+fn scene_name(path: &Path) -> String {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    absolute
+        .parent()
+        .and_then(Path::file_name)
+        .or(absolute.file_stem())
+        .map_or_else(
+            || "scene".to_owned(),
+            |name| name.to_string_lossy().into_owned(),
+        )
+}

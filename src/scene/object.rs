@@ -1,0 +1,341 @@
+//! `[[real]]` and `[[virtual]]`: meshes and built-in shapes, placed, with their materials.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::sync::Arc;
+
+use glam::{DMat3, DMat4, DVec3};
+
+use super::error::{Result, SceneError};
+use super::gltf::{GltfScene, PlacedLight, Problem, PunctualLight, load_gltf};
+use super::material::{lambertian, read_material};
+use super::pose::read_transform;
+use super::reader::{Choice, MAX_MAGNITUDE, Node, Table};
+use super::shape::Shape;
+use super::{AlphaMode, Instance, Light, LightKind, Material, Object, Side};
+
+const KEYS: &[&str] = &[
+    "mesh",
+    "shape",
+    "name",
+    "translation",
+    "rotation_deg",
+    "rotation",
+    "scale",
+    "material",
+];
+
+const REAL_KEYS: &[&str] = &["albedo", "smooth_radius_m", "self_shadow_bias_m"];
+
+/// Albedo of a proxy of which nothing is known.
+const UNKNOWN_ALBEDO: f32 = 0.5;
+
+/// Reads the objects of one scene file.
+pub(super) struct ObjectReader<'w> {
+    has_photo: bool,
+    warnings: &'w mut Vec<String>,
+    /// Lights that meshes brought.
+    lights: Vec<Light>,
+    /// A file that several objects name is read once.
+    meshes: HashMap<PathBuf, Rc<GltfScene>>,
+}
+
+/// What an object is made of, before materials are settled.
+struct Parts {
+    name: String,
+    instances: Vec<Instance>,
+    lights: Vec<PlacedLight>,
+    has_materials: bool,
+}
+
+impl<'w> ObjectReader<'w> {
+    pub fn new(has_photo: bool, warnings: &'w mut Vec<String>) -> Self {
+        Self {
+            has_photo,
+            warnings,
+            lights: Vec::new(),
+            meshes: HashMap::new(),
+        }
+    }
+
+    /// All of `[[real]]`, then all of `[[virtual]]`, and the lights that came with them.
+    pub fn read_all(mut self, root: &Table) -> Result<(Vec<Object>, Vec<Light>)> {
+        let mut objects = Vec::new();
+        for (key, side) in [("real", Side::Real), ("virtual", Side::Virtual)] {
+            for node in root.list(key)? {
+                objects.push(self.read(&node, side)?);
+            }
+        }
+        Ok((objects, self.lights))
+    }
+
+    fn read(&mut self, node: &Node, side: Side) -> Result<Object> {
+        let table = node.any_table(match side {
+            Side::Real => "[[real]]",
+            Side::Virtual => "[[virtual]]",
+        })?;
+        let shape = check_keys(&table, side)?;
+        let parts = match shape {
+            Some(shape) => read_shape(shape, &table)?,
+            None => table.required("mesh", "mesh = \"file.glb\"", |node| self.read_mesh(node))?,
+        };
+        let world_from_object = read_transform(&table)?;
+        table.optional("smooth_radius_m", refuse_smoothing)?;
+        let name = table.optional("name", |node| Ok(node.string()?.to_owned()))?;
+        let mut object = Object {
+            name: name.unwrap_or(parts.name),
+            side,
+            world_from_object,
+            instances: parts.instances,
+            self_shadow_bias_m: table
+                .optional("self_shadow_bias_m", Node::not_negative)?
+                .unwrap_or(0.0) as f32,
+            albedo_from_photo: false,
+        };
+        for light in &parts.lights {
+            let kind = place_light(world_from_object, light)
+                .ok_or_else(|| too_far(&table, "a light of the mesh"))?;
+            self.lights.push(Light { kind, side });
+        }
+        self.drop_flat_instances(&mut object);
+        check_extent(&table, &object)?;
+        self.settle_materials(&table, &mut object, parts.has_materials, shape.is_some())?;
+        Ok(object)
+    }
+
+    fn read_mesh(&mut self, node: &Node) -> Result<Parts> {
+        let path = node.existing_file()?;
+        let mesh = match self.meshes.get(&path) {
+            Some(mesh) => Rc::clone(mesh),
+            None => {
+                let mesh = load_gltf(&path)
+                    .map_err(|error| node.file_error(&path, &advise(&error.problem)))?;
+                self.warnings
+                    .extend(node.file_warnings(mesh.warnings.clone()));
+                let mesh = Rc::new(mesh);
+                self.meshes.insert(path.clone(), Rc::clone(&mesh));
+                mesh
+            }
+        };
+        Ok(Parts {
+            name: file_stem(&path),
+            instances: mesh.instances.clone(),
+            lights: mesh.lights.clone(),
+            has_materials: mesh.has_materials,
+        })
+    }
+
+    /// A node of scale 0 is glTF's way to hide things; its normals would be NaN.
+    fn drop_flat_instances(&mut self, object: &mut Object) {
+        let world_from_object = object.world_from_object;
+        let before = object.instances.len();
+        object
+            .instances
+            .retain(|instance| is_invertible(world_from_object * instance.object_from_local));
+        let dropped = before - object.instances.len();
+        if dropped > 0 {
+            let name = &object.name;
+            self.warnings.push(format!(
+                "{name}: {dropped} parts are dropped: their transforms flatten them"
+            ));
+        }
+    }
+
+    fn settle_materials(
+        &mut self,
+        table: &Table,
+        object: &mut Object,
+        has_materials: bool,
+        is_shape: bool,
+    ) -> Result<()> {
+        table.refuse_both("material", "albedo")?;
+        let material = table.optional("material", |node| read_material(node, &object.name))?;
+        let wish = table.optional("albedo", |node| self.read_albedo(node))?;
+        if let Some(material) = material {
+            replace_materials(object, |_| material.clone());
+        } else if wish.is_some() || (object.side == Side::Real && !has_materials) {
+            object.albedo_from_photo = self.has_photo;
+            let name = object.name.clone();
+            replace_materials(object, |own| {
+                keep_alpha(lambertian(&name, UNKNOWN_ALBEDO), own)
+            });
+        } else if is_shape {
+            let name = object.name.clone();
+            replace_materials(object, |_| Material {
+                name: name.clone(),
+                ..Material::default()
+            });
+        }
+        Ok(())
+    }
+
+    fn read_albedo(&self, node: &Node) -> Result<()> {
+        if node.string()? != "from-photo" {
+            return Err(node.impossible("\"from-photo\" (colours stand in `material`)"));
+        }
+        if !self.has_photo {
+            return Err(node.error(
+                "`albedo` is \"from-photo\" without a photograph",
+                "`image` in [photo]",
+                "add the photograph, or give a `material`",
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Refuses keys that do not go with this side and shape; returns the shape.
+fn check_keys(table: &Table, side: Side) -> Result<Option<Shape>> {
+    table.refuse_both("mesh", "shape")?;
+    let shape: Option<Shape> = table.optional("shape", |node| node.choice())?;
+    if side == Side::Virtual {
+        for key in REAL_KEYS {
+            let message = format!(
+                "`{key}` in [[virtual]]; expected it in [[real]] only, where the photograph and scans are; remove it"
+            );
+            if let Some(error) = table.key_error(key, &message) {
+                return Err(error);
+            }
+        }
+    }
+    let mut known = KEYS.to_vec();
+    known.extend(shape.map_or(&[][..], Shape::keys));
+    if side == Side::Real {
+        known.extend(REAL_KEYS);
+    }
+    table.refuse_unknown(&known)?;
+    Ok(shape)
+}
+
+/// A scan left rough where smoothing was asked for would be another picture than the one asked for.
+fn refuse_smoothing(node: &Node) -> Result<()> {
+    if node.not_negative()? > 0.0 {
+        return Err(node.error(
+            "`smooth_radius_m` is not applied by this version",
+            "0",
+            "remove it",
+        ));
+    }
+    Ok(())
+}
+
+fn read_shape(shape: Shape, table: &Table) -> Result<Parts> {
+    Ok(Parts {
+        name: shape.name().to_owned(),
+        instances: vec![Instance {
+            object_from_local: DMat4::IDENTITY,
+            primitive: Arc::new(shape.read(table)?),
+            material: Arc::new(Material::default()),
+        }],
+        lights: Vec::new(),
+        has_materials: false,
+    })
+}
+
+fn replace_materials(object: &mut Object, material: impl Fn(&Material) -> Material) {
+    for instance in &mut object.instances {
+        instance.material = Arc::new(material(&instance.material));
+    }
+}
+
+/// Leaves that a scan cuts out by alpha stay cut out when their colour comes from the photograph.
+fn keep_alpha(material: Material, own: &Material) -> Material {
+    if own.alpha_mode == AlphaMode::Opaque {
+        return material;
+    }
+    let [r, g, b, _] = material.base_color;
+    Material {
+        base_color: [r, g, b, own.base_color[3]],
+        base_color_texture: own.base_color_texture.clone(),
+        alpha_mode: own.alpha_mode,
+        ..material
+    }
+}
+
+fn is_invertible(world_from_local: DMat4) -> bool {
+    let axes = DMat3::from_mat4(world_from_local);
+    let lengths = [axes.x_axis, axes.y_axis, axes.z_axis].map(DVec3::length);
+    let volume = lengths.iter().product::<f64>();
+    lengths.iter().all(|length| *length > 1e-30) && axes.determinant().abs() > 1e-9 * volume
+}
+
+fn check_extent(table: &Table, object: &Object) -> Result<()> {
+    for instance in &object.instances {
+        let world_from_local = object.world_from_object * instance.object_from_local;
+        for position in &instance.primitive.positions {
+            let position = DVec3::from(position.map(f64::from));
+            if !is_near(world_from_local.transform_point3(position)) {
+                return Err(too_far(table, &instance.primitive.name));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// False for NaN too.
+fn is_near(world: DVec3) -> bool {
+    world.to_array().iter().all(|x| x.abs() <= MAX_MAGNITUDE)
+}
+
+fn too_far(table: &Table, what: &str) -> SceneError {
+    table.error(
+        format!("`{what}` is more than 1e15 m from the origin"),
+        "coordinates of at most 1e15 m",
+        "lower `scale` or `translation`",
+    )
+}
+
+/// None where the light's position or direction is lost in a flat or huge transform.
+fn place_light(world_from_object: DMat4, light: &PlacedLight) -> Option<LightKind> {
+    let world_from_light = world_from_object * light.object_from_light;
+    let position = world_from_light.w_axis.truncate();
+    let direction = world_from_light
+        .transform_vector3(DVec3::NEG_Z)
+        .try_normalize()
+        .map(|direction| direction.to_array());
+    if !is_near(position) {
+        return None;
+    }
+    let position = position.to_array();
+    Some(match light.kind {
+        PunctualLight::Point { intensity } => LightKind::Point {
+            position,
+            intensity,
+        },
+        PunctualLight::Spot {
+            intensity,
+            inner_deg,
+            outer_deg,
+        } => LightKind::Spot {
+            position,
+            direction: direction?,
+            intensity,
+            inner_deg,
+            outer_deg,
+        },
+        PunctualLight::Directional { irradiance } => LightKind::Directional {
+            direction: direction?,
+            irradiance,
+        },
+    })
+}
+
+/// "problem; expected ...; how to mend" of a mesh file.
+fn advise(problem: &Problem) -> String {
+    match problem {
+        Problem::Unreadable(_) => {
+            format!("{problem}; expected a readable file; correct the path or the rights")
+        }
+        Problem::Malformed { .. } => {
+            format!("{problem}; expected valid glTF 2.0; export or repair the model")
+        }
+        Problem::Extension { .. } => problem.to_string(),
+    }
+}
+
+fn file_stem(path: &Path) -> String {
+    path.file_stem()
+        .map(|stem| stem.to_string_lossy().into_owned())
+        .unwrap_or_default()
+}

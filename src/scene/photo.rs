@@ -1,0 +1,76 @@
+//! `[photo]`: the camera image and the exposure that ties the scene to it.
+
+use std::path::Path;
+
+use super::error::Result;
+use super::image_file::{Pixels, read_image};
+use super::reader::{Node, Table};
+use super::srgb::{decode8, decode16};
+use super::{EncodedPhoto, Exposure, Photo};
+
+const KEYS: &[&str] = &["image", "exposure_ev"];
+
+pub(super) fn read_photo(
+    root: &Table,
+    warnings: &mut Vec<String>,
+) -> Result<(Option<Photo>, Exposure)> {
+    let Some(table) = root.table("photo", "[photo]", KEYS)? else {
+        return Ok((None, Exposure::Ev(0.0)));
+    };
+    let photo = table.optional("image", |node| read_photo_image(node, warnings))?;
+    let exposure = table.optional("exposure_ev", |node| read_exposure(node, photo.is_some()))?;
+    Ok((photo, exposure.unwrap_or(Exposure::Ev(0.0))))
+}
+
+fn read_exposure(node: &Node, has_photo: bool) -> Result<Exposure> {
+    if !node.is_string() {
+        let expected = "a number from -64 to 64, or \"auto\"";
+        return Ok(Exposure::Ev(node.number(expected, |ev| ev.abs() <= 64.0)?));
+    }
+    if node.string()? != "auto" {
+        return Err(node.impossible("a number, or \"auto\""));
+    }
+    if !has_photo {
+        return Err(node.error(
+            "`exposure_ev` is \"auto\" without a photograph",
+            "`image` beside it",
+            "add the photograph or give a number",
+        ));
+    }
+    Ok(Exposure::Auto)
+}
+
+fn read_photo_image(node: &Node, warnings: &mut Vec<String>) -> Result<Photo> {
+    let path = node.existing_file()?;
+    let (photo, notes) = Photo::read(&path).map_err(|problem| node.file_error(&path, &problem))?;
+    warnings.extend(node.file_warnings(notes));
+    Ok(photo)
+}
+
+impl Photo {
+    /// Reads and decodes an image file (PNG, JPEG, OpenEXR, Radiance HDR), with warnings of what in it is ignored.
+    ///
+    /// # Errors
+    /// Why the file cannot be used, in one line without its path.
+    pub fn read(path: &Path) -> std::result::Result<(Self, Vec<String>), String> {
+        let image = read_image(path)?;
+        let (linear, encoded) = match image.pixels {
+            Pixels::Srgb8(codes) => (
+                codes.iter().map(|code| code.map(decode8)).collect(),
+                EncodedPhoto::Srgb8(codes),
+            ),
+            Pixels::Srgb16(codes) => (
+                codes.iter().map(|code| code.map(decode16)).collect(),
+                EncodedPhoto::Srgb16(codes),
+            ),
+            Pixels::Linear(linear) => (linear, EncodedPhoto::Linear),
+        };
+        let photo = Self {
+            width: image.width,
+            height: image.height,
+            linear,
+            encoded,
+        };
+        Ok((photo, image.warnings))
+    }
+}
