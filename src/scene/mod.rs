@@ -17,6 +17,7 @@ mod pose;
 mod reader;
 mod settings;
 mod shape;
+pub mod smooth;
 pub mod srgb;
 #[cfg(test)]
 mod tests;
