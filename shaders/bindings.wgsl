@@ -40,6 +40,8 @@ struct Frame {
 }
 
 const FRAME_ENV_DRAWN: u32 = 1u;
+const FRAME_AOVS: u32 = 2u;
+const FRAME_ALPHA: u32 = 4u;
 
 struct Vertex {
     position_u0: vec4<f32>,
@@ -132,11 +134,6 @@ struct Light {
     pad: vec2<u32>,
 }
 
-struct AliasEntry {
-    threshold: f32,
-    alias_: u32,
-}
-
 const PIXEL_BEAM_MAY_MEET_VIRTUAL: u32 = 1u;
 const PIXEL_OUT_OF_REACH: u32 = 2u;
 
@@ -153,7 +150,7 @@ struct PixelInfo {
 @group(0) @binding(5) var<storage, read> texels: array<u32>;
 @group(0) @binding(6) var<storage, read> lights: array<Light>;
 @group(0) @binding(7) var<storage, read> env_texels: array<f32>;
-@group(0) @binding(8) var<storage, read> env_alias: array<AliasEntry>;
+@group(0) @binding(8) var<storage, read> env_cdf: array<f32>;
 @group(0) @binding(9) var<storage, read> photo_albedo: array<vec4<f32>>;
 @group(0) @binding(10) var<storage, read> pixels: array<PixelInfo>;
 @group(0) @binding(11) var<storage, read> bvh_nodes: array<vec4<u32>>;

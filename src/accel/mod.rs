@@ -21,6 +21,8 @@ mod trace;
 mod wide;
 
 #[cfg(test)]
+mod gpu_tests;
+#[cfg(test)]
 mod test_support;
 #[cfg(test)]
 mod tests;

@@ -1,1 +1,11 @@
-//! cpu.
+//! The CPU backend: the estimator on all cores. It is the reference the shaders are compared with, and the fallback where there is no GPU.
+
+pub mod contribution;
+pub mod estimator;
+pub mod pilot;
+pub mod render;
+pub mod state;
+pub mod trace;
+pub mod vertex;
+
+pub use pilot::pilot;

@@ -3,9 +3,9 @@
 use bytemuck::Zeroable;
 
 use super::{GpuDevice, GpuError};
-use crate::packed::{AliasEntry, Frame, Light, Material, PixelInfo, TextureRef, Triangle, Vertex};
+use crate::packed::{Frame, Light, Material, PackedScene, PixelInfo, TextureRef, Triangle, Vertex};
 
-/// The arrays of a packed scene, any of them possibly empty; [`SceneBuffers::upload`] takes a whole scene.
+/// The arrays of a packed scene, any of them possibly empty; `From` a packed scene: all of them.
 #[derive(Clone, Copy)]
 pub struct SceneParts<'a> {
     pub frame: Frame,
@@ -16,7 +16,7 @@ pub struct SceneParts<'a> {
     pub texels: &'a [u32],
     pub lights: &'a [Light],
     pub env_texels: &'a [f32],
-    pub env_alias: &'a [AliasEntry],
+    pub env_cdf: &'a [f32],
     pub photo_albedo: &'a [[f32; 4]],
     pub pixels: &'a [PixelInfo],
     /// Both worlds, the real one first.
@@ -35,11 +35,32 @@ impl Default for SceneParts<'_> {
             texels: &[],
             lights: &[],
             env_texels: &[],
-            env_alias: &[],
+            env_cdf: &[],
             photo_albedo: &[],
             pixels: &[],
             bvh_nodes: [&[], &[]],
             bvh_leaves: [&[], &[]],
+        }
+    }
+}
+
+impl<'a> From<&'a PackedScene> for SceneParts<'a> {
+    fn from(scene: &'a PackedScene) -> Self {
+        let worlds = [&scene.real_bvh, &scene.virtual_bvh];
+        Self {
+            frame: scene.frame,
+            triangles: &scene.triangles,
+            vertices: &scene.vertices,
+            materials: &scene.materials,
+            texture_refs: &scene.texture_refs,
+            texels: &scene.texels,
+            lights: &scene.lights,
+            env_texels: &scene.env_texels,
+            env_cdf: &scene.env_cdf,
+            photo_albedo: &scene.photo_albedo,
+            pixels: &scene.pixels,
+            bvh_nodes: worlds.map(|bvh| bytemuck::cast_slice(bvh.gpu_nodes())),
+            bvh_leaves: worlds.map(|bvh| bvh.gpu_leaves()),
         }
     }
 }
@@ -66,7 +87,7 @@ impl SceneBuffers {
             ("texels", one(parts.texels)),
             ("lights", one(parts.lights)),
             ("environment map", one(parts.env_texels)),
-            ("environment table", one(parts.env_alias)),
+            ("environment table", one(parts.env_cdf)),
             ("albedo of the photograph", one(parts.photo_albedo)),
             ("pixels", one(parts.pixels)),
             ("BVH nodes", [real_nodes, virtual_nodes]),
@@ -164,4 +185,32 @@ fn out_of_memory(gpu: &GpuDevice, arrays: &[(&str, [&[u8]; 2])], error: &wgpu::E
 
 fn mebibytes(bytes: u64) -> String {
     format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::AdapterChoice;
+
+    #[test]
+    fn a_scene_beyond_the_limits_is_refused_with_what_to_do() {
+        if crate::gpu::harness::test_device().is_none() {
+            return;
+        }
+        let mut gpu = GpuDevice::open(AdapterChoice::Any).expect("opens");
+        let vertices = vec![Vertex::zeroed(); 20_000];
+        let parts = SceneParts {
+            vertices: &vertices,
+            ..SceneParts::default()
+        };
+        assert!(SceneBuffers::from_parts(&gpu, &parts).is_ok());
+        gpu.limits.max_storage_buffer_binding_size = 1 << 20;
+        let error = SceneBuffers::from_parts(&gpu, &parts)
+            .err()
+            .expect("does not fit")
+            .to_string();
+        for part in ["vertices", "1.5 MiB", "1.0 MiB", "--backend cpu"] {
+            assert!(error.contains(part), "{error}");
+        }
+    }
 }

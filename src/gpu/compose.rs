@@ -10,7 +10,24 @@ use super::GpuError;
 use crate::packed::{self, PackedScene};
 
 /// The embedded modules: name and source.
-pub const MODULES: &[(&str, &str)] = &[("bindings", include_str!("../../shaders/bindings.wgsl"))];
+pub const MODULES: &[(&str, &str)] = &[
+    ("bindings", include_str!("../../shaders/bindings.wgsl")),
+    ("cones", include_str!("../../shaders/cones.wgsl")),
+    ("contribution", include_str!("../../shaders/contribution.wgsl")),
+    ("environment", include_str!("../../shaders/environment.wgsl")),
+    ("estimator", include_str!("../../shaders/estimator.wgsl")),
+    ("film", include_str!("../../shaders/film.wgsl")),
+    ("kernels", include_str!("../../shaders/kernels.wgsl")),
+    ("lanes", include_str!("../../shaders/lanes.wgsl")),
+    ("lens", include_str!("../../shaders/lens.wgsl")),
+    ("lights", include_str!("../../shaders/lights.wgsl")),
+    ("math", include_str!("../../shaders/math.wgsl")),
+    ("request", include_str!("../../shaders/request.wgsl")),
+    ("sampler", include_str!("../../shaders/sampler.wgsl")),
+    ("state", include_str!("../../shaders/state.wgsl")),
+    ("trace", include_str!("../../shaders/trace.wgsl")),
+    ("vertex", include_str!("../../shaders/vertex.wgsl")),
+];
 
 macro_rules! features {
     ($($(#[$doc:meta])* $name:ident,)*) => {
@@ -24,6 +41,16 @@ macro_rules! features {
             /// Every flag by its name in the shaders.
             pub fn flags(&self) -> Vec<(&'static str, bool)> {
                 vec![$((stringify!($name), self.$name),)*]
+            }
+
+            /// With one flag the other way round; unchanged if there is none of that name.
+            #[must_use]
+            pub fn toggled(mut self, name: &str) -> Self {
+                match name {
+                    $(stringify!($name) => self.$name = !self.$name,)*
+                    _ => {}
+                }
+                self
             }
 
             /// Everything on: the largest variant.

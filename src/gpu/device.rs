@@ -1,7 +1,7 @@
 //! Choosing and opening a graphics device, noticing its loss, reading buffers back.
 
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
@@ -10,6 +10,9 @@ use super::GpuError;
 /// A submission that has not ended by then never will: a fraction of a second is the rule, shader compilation on a software device
 /// the exception.
 const PATIENCE: Duration = Duration::from_secs(300);
+
+/// How long the callback of a finished copy may lag behind before the device is polled again.
+const CALLBACK_DELAY: Duration = Duration::from_millis(20);
 
 /// Which devices are acceptable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -247,12 +250,18 @@ impl GpuDevice {
             // The receiver outlives the poll below; if it does not, nobody waits for the answer.
             let _ = sender.send(result);
         });
-        self.wait(None)?;
         let lost = |message: String| GpuError::Lost(message);
-        receiver
-            .try_recv()
-            .map_err(|_| lost("a buffer was not handed back".to_owned()))?
-            .map_err(|error| lost(error.to_string()))?;
+        // Where several threads poll, another one may be about to run our callback when this one's poll returns.
+        let deadline = Instant::now() + PATIENCE;
+        let answer = loop {
+            self.wait(None)?;
+            match receiver.recv_timeout(CALLBACK_DELAY) {
+                Ok(answer) => break answer,
+                Err(mpsc::RecvTimeoutError::Timeout) if Instant::now() < deadline => {}
+                Err(error) => return Err(lost(error.to_string())),
+            }
+        };
+        answer.map_err(|error| lost(error.to_string()))?;
         let data = slice
             .get_mapped_range()
             .map_err(|error| lost(error.to_string()))?
@@ -283,4 +292,51 @@ impl GpuDevice {
 fn note(fault: &Mutex<Option<String>>, message: String) {
     let mut fault = fault.lock().unwrap_or_else(PoisonError::into_inner);
     fault.get_or_insert(message);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn adapters_are_listed_best_first_for_people_and_programs() {
+        let adapters = list_adapters();
+        eprintln!("{} adapters", adapters.len());
+        assert!(adapters.is_sorted_by_key(|adapter| !adapter.hardware));
+        let json = serde_json::to_value(&adapters).expect("serialises");
+        assert_eq!(json.as_array().map(Vec::len), Some(adapters.len()));
+        if let Ok(gpu) = GpuDevice::open(AdapterChoice::Any) {
+            assert_eq!(json[0]["name"], gpu.info.name.as_str());
+        }
+    }
+
+    #[test]
+    fn hardware_is_not_replaced_by_software() {
+        let hardware = list_adapters().iter().any(|adapter| adapter.hardware);
+        match GpuDevice::open(AdapterChoice::Hardware) {
+            Ok(gpu) => assert!(hardware && is_hardware(gpu.info.device_type)),
+            Err(GpuError::NoAdapter(_)) => assert!(!hardware),
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let Some(gpu) = crate::gpu::harness::test_device() else {
+            return;
+        };
+        let words: Vec<u32> = (0..999).collect();
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: 4 * words.len() as u64,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        gpu.queue
+            .write_buffer(&buffer, 0, bytemuck::cast_slice(&words));
+        let encoder = gpu.device.create_command_encoder(&Default::default());
+        gpu.submit_and_wait(encoder).expect("submits");
+        let bytes = gpu.read(&buffer, 4 * 500).expect("reads");
+        assert_eq!(bytes, bytemuck::cast_slice::<u32, u8>(&words[..500]));
+    }
 }

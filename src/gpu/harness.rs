@@ -18,7 +18,7 @@
 //! assert!(inputs.iter().zip(&outputs).all(|(i, o)| 2 * i == *o));
 //! ```
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use super::{AdapterChoice, Composer, Features, GpuDevice, GpuError, SceneBuffers, kernel::Kernel};
 
@@ -29,9 +29,9 @@ const WORKGROUP: usize = 64;
 ///
 /// # Panics
 /// With `MIXRAY_REQUIRE_GPU=1` in the environment and no device: there, a skipped test is a failed one.
-pub fn test_device() -> Option<&'static GpuDevice> {
-    static DEVICE: OnceLock<Result<GpuDevice, GpuError>> = OnceLock::new();
-    match DEVICE.get_or_init(|| GpuDevice::open(AdapterChoice::Any)) {
+pub fn test_device() -> Option<&'static Arc<GpuDevice>> {
+    static DEVICE: OnceLock<Result<Arc<GpuDevice>, GpuError>> = OnceLock::new();
+    match DEVICE.get_or_init(|| GpuDevice::open(AdapterChoice::Any).map(Arc::new)) {
         Ok(gpu) => Some(gpu),
         Err(error) => {
             let required = std::env::var("MIXRAY_REQUIRE_GPU").is_ok_and(|value| value == "1");

@@ -125,7 +125,6 @@ fn host() -> Vec<(&'static str, u32, Fields)> {
             triangle,
             pad,
         }),
-        host_fields!(AliasEntry { threshold, alias }),
         host_fields!(PixelInfo {
             difference_probability,
             flags

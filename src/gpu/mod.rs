@@ -9,10 +9,16 @@ pub mod compose;
 pub mod device;
 pub mod harness;
 pub mod kernel;
+mod lanes;
+mod pacer;
+mod profile;
+pub mod wavefront;
 
 pub use buffers::{SceneBuffers, SceneParts};
 pub use compose::{Composer, Features};
 pub use device::{AdapterChoice, AdapterReport, GpuDevice, list_adapters};
+pub use profile::KernelSeconds;
+pub use wavefront::{GpuBackend, PixelWork};
 
 /// What can go wrong on the GPU, in the words the user gets.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -37,6 +43,9 @@ pub enum GpuError {
     },
     #[error("shader {entry_point} binds {name}, which was not given")]
     Unbound { entry_point: String, name: String },
+    /// A sample asked for more rays than any sample can: a defect of this program.
+    #[error("samples did not end after {0} steps on the graphics device")]
+    Endless(u32),
     /// The device is gone or has refused a command; nothing of what it held can be read any more.
     #[error("the graphics device was lost: {0}")]
     Lost(String),
@@ -44,3 +53,7 @@ pub enum GpuError {
 
 #[cfg(test)]
 mod layout_test;
+#[cfg(test)]
+mod variants_test;
+#[cfg(test)]
+mod wavefront_test;

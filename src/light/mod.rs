@@ -1,1 +1,5 @@
-//! light.
+//! Light: emitters, the environment, and the cones in which virtual geometry is seen.
+
+pub mod cones;
+pub mod environment;
+pub mod lights;

@@ -1,1 +1,20 @@
-//! material.
+//! What light does at a surface: textures, the shading point, and glTF's metallic-roughness scattering.
+//!
+//! [`surface_at`] turns a hit into a [`Surface`] with every texture read; [`bsdf_eval`] and [`bsdf_sample`] scatter light there.
+//! Each file has a WGSL twin of the same name in `shaders/`.
+
+mod bsdf;
+mod fresnel;
+mod ggx;
+mod normal;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod texture;
+
+pub use bsdf::{
+    BsdfEval, BsdfSample, bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_is_delta,
+    bsdf_is_lambertian, bsdf_sample,
+};
+pub use surface::{Surface, surface_alpha, surface_at};
+pub use texture::{srgb_decode, texture_sample};

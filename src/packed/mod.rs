@@ -3,8 +3,12 @@
 //! Every record here has a WGSL struct of the same name and field order in `shaders/bindings.wgsl`; a test compares the two by reflection.
 //! Triangle ids are global: real triangles come first (`0..Frame::real_triangle_count`), virtual ones after.
 
+mod build;
+mod lights;
+mod materials;
 mod records;
 
+pub use build::PackError;
 pub use records::*;
 
 use crate::accel::WorldBvh;
@@ -34,10 +38,13 @@ pub struct PackedScene {
     pub lights: Vec<Light>,
     /// Environment texels, three floats each, row-major; empty for a constant environment or none.
     pub env_texels: Vec<f32>,
-    /// One entry a cell of the environment (see `light::environment`).
-    pub env_alias: Vec<AliasEntry>,
+    /// Cumulative distributions of the environment's cells (see `light::environment::EnvironmentTable`).
+    pub env_cdf: Vec<f32>,
     /// Albedo of the photograph's pixels for `albedo = "from-photo"`: rgb and the depth (metres along the axis) it was seen at; empty where unused.
     pub photo_albedo: Vec<[f32; 4]>,
     /// One word a pixel: what the pilot found (see [`PixelInfo`]).
     pub pixels: Vec<PixelInfo>,
+    material_table: materials::MaterialTable,
+    real_vertex_count: usize,
+    env_mean_luminance: f64,
 }

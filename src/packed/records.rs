@@ -48,7 +48,7 @@ pub struct Frame {
     pub env_sin: f32,
     pub env_width: u32,
     pub env_height: u32,
-    /// Constant radiance, or the scale of the map; w: probability density normaliser of the map (1 / sum of cell weights).
+    /// Constant radiance, or the scale of the map; w: the map's `EnvironmentTable::normaliser`.
     pub env_radiance: [f32; 4],
     /// Index of the environment in the light list, or NONE.
     pub env_light: u32,
@@ -66,6 +66,10 @@ pub struct Frame {
 
 /// The environment is visible to primary rays (a photograph is present).
 pub const FRAME_ENV_DRAWN: u32 = 1;
+/// Depth, normal and albedo of the first hit are wanted, so the real primary ray is always traced.
+pub const FRAME_AOVS: u32 = 2;
+/// Some material is alpha-masked or blended.
+pub const FRAME_ALPHA: u32 = 4;
 
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -192,13 +196,6 @@ pub struct Light {
     /// Global triangle id for LIGHT_TRIANGLE, else NONE.
     pub triangle: u32,
     pub pad: [u32; 2],
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct AliasEntry {
-    pub threshold: f32,
-    pub alias: u32,
 }
 
 /// The lens beam of this pixel may meet virtual geometry.

@@ -1,1 +1,229 @@
-//! renderer.
+//! The progressive renderer behind every command.
+//!
+//! Built once from a scene; [`Renderer::advance`] takes it further by a budget, [`Renderer::film`] shows where it stands at any moment, and
+//! edits (lens, object transforms, lights) rebuild only what they change.
+//!
+//! ```no_run
+//! use mixray::renderer::{Budget, Renderer, RendererOptions};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scene = mixray::scene::load(std::path::Path::new("scenes/demo/scene.toml"))?;
+//! let mut renderer = Renderer::new(scene, RendererOptions::default())?;
+//! renderer.advance(Budget::Rays(1_000_000), &|| false, &mut |_| ())?;
+//! let first_look = renderer.picture(); // composited over the photograph
+//! renderer.advance(Budget::Complete, &|| false, &mut |p| eprintln!("{} of {} rays per pixel", p.samples, p.samples_total))?;
+//! # let _ = first_look;
+//! # Ok(())
+//! # }
+//! ```
+
+mod control;
+mod photo_albedo;
+mod stats;
+
+use std::time::Instant;
+
+pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
+pub use stats::Stats;
+
+use crate::cpu;
+use crate::film::{Film, Picture, Planes, composite, planes};
+use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
+use crate::scene::{Composite, Exposure, Scene};
+
+/// The longest a pass runs before the film is shown, in rays per pixel.
+const MAX_PASS_SAMPLES: u32 = 8;
+
+/// What the caller wants beside the scene's own settings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RendererOptions {
+    /// Depth, normal and albedo of the first hit, and the real radiance everywhere.
+    pub all_planes: bool,
+}
+
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    #[error(transparent)]
+    Pack(#[from] crate::packed::PackError),
+    #[error("there is no object number {0} in the scene")]
+    NoSuchObject(usize),
+}
+
+/// Seconds spent before and in rendering.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seconds {
+    /// Acceleration structures, packing, the pilot and the albedo estimate.
+    pub build: f64,
+    /// Shader compilation.
+    pub compile: f64,
+    pub render: f64,
+}
+
+/// A scene being rendered.
+pub struct Renderer {
+    scene: Scene,
+    packed: PackedScene,
+    film: Film,
+    backend: Backend,
+    options: RendererOptions,
+    rays: RayTotals,
+    seconds: Seconds,
+    notes: Vec<String>,
+}
+
+enum Backend {
+    Cpu,
+}
+
+impl Renderer {
+    /// Builds acceleration structures and everything else that rendering needs.
+    ///
+    /// # Errors
+    /// The scene does not fit the packed form or the adapter, or `gpu` was asked for where there is none.
+    pub fn new(scene: Scene, options: RendererOptions) -> Result<Self, RenderError> {
+        let start = Instant::now();
+        let packed = PackedScene::build(&scene)?;
+        let film = Film::new(packed.frame.width, packed.frame.height, 0, options.all_planes);
+        let mut renderer = Self {
+            scene,
+            packed,
+            film,
+            backend: Backend::Cpu,
+            options,
+            rays: RayTotals::default(),
+            seconds: Seconds::default(),
+            notes: Vec::new(),
+        };
+        renderer.prepare();
+        renderer.seconds.build = start.elapsed().as_secs_f64();
+        Ok(renderer)
+    }
+
+    /// What follows from the packed scene: exposure, albedo from the photograph, the pilot.
+    fn prepare(&mut self) {
+        if self.options.all_planes {
+            self.packed.frame.flags |= FRAME_AOVS;
+        }
+        let from_photo = self.packed.materials.iter().any(|m| m.flags & MATERIAL_PHOTO_ALBEDO != 0);
+        if let Some(photo) = &self.scene.photo {
+            if self.scene.settings.exposure == Exposure::Auto {
+                match photo_albedo::fit_exposure_ev(&mut self.packed, photo) {
+                    Some(ev) => {
+                        self.packed.frame.exposure_scale = ev.exp2() as f32;
+                        self.notes.push(format!("exposure_ev = {ev:.3} fits the proxy's light to the photograph"));
+                    }
+                    None => self.notes.push("exposure_ev = \"auto\": the camera sees no lit proxy; 0 is used".to_owned()),
+                }
+            }
+            if from_photo {
+                photo_albedo::estimate_photo_albedo(&mut self.packed, photo);
+            }
+        }
+        self.packed.pixels = cpu::pilot(&self.packed);
+    }
+
+    /// True if no pixel is within reach of anything virtual: the picture is the photograph.
+    fn nothing_to_trace(&self) -> bool {
+        self.packed.pixels.iter().all(|p| p.flags & PIXEL_OUT_OF_REACH != 0)
+    }
+
+    /// Renders on until the budget is spent, the scene's rays per pixel are reached or `cancelled` says so; `progress` hears after each pass.
+    /// The film is then complete as far as it goes, edge pixels included.
+    ///
+    /// # Errors
+    /// Only what the GPU refuses for good; a device that is lost is replaced by the CPU.
+    pub fn advance(
+        &mut self,
+        budget: Budget,
+        cancelled: &(dyn Fn() -> bool + Sync),
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<(), RenderError> {
+        let start = Instant::now();
+        let deadline = match budget {
+            Budget::Time(time) => Some(start + time),
+            Budget::Complete | Budget::Rays(_) => None,
+        };
+        let total = self.scene.settings.rays_per_pixel;
+        let pixels = u64::from(self.film.width) * u64::from(self.film.height);
+        let before = self.samples();
+        let end = match budget {
+            Budget::Rays(rays) => total.min(before + u32::try_from((rays / pixels.max(1)).max(1)).unwrap_or(u32::MAX - before)),
+            Budget::Complete | Budget::Time(_) => total,
+        };
+        let mut done = before;
+        while done < end && !self.nothing_to_trace() {
+            let step = done.clamp(1, MAX_PASS_SAMPLES).min(end - done);
+            let cancel = Cancel::new(cancelled, deadline);
+            self.run_pass(Pass::Main { end: done + step }, &cancel)?;
+            if cancel.is_cancelled() {
+                break;
+            }
+            done += step;
+            progress(Progress { samples: done, samples_total: total, rays: self.rays, elapsed: start.elapsed() });
+        }
+        // Short beside the main passes, and without it edge pixels would not be Eq. 4: not cancelled.
+        let everywhere = self.options.all_planes || self.scene.settings.composite == Composite::Quotient;
+        self.run_pass(Pass::Real { everywhere }, &Cancel::new(&|| false, None))?;
+        self.seconds.render += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    fn run_pass(&mut self, pass: Pass, cancel: &Cancel) -> Result<(), RenderError> {
+        self.rays += cpu::render::render_pass(&self.packed, &mut self.film, pass, cancel);
+        Ok(())
+    }
+
+    /// Rays per pixel that every pixel within reach has taken.
+    pub fn samples(&self) -> u32 {
+        let within_reach = self.film.pixels.iter().zip(&self.packed.pixels).filter(|(_, info)| info.flags & PIXEL_OUT_OF_REACH == 0);
+        within_reach.map(|(sums, _)| sums.n).min().unwrap_or(self.scene.settings.rays_per_pixel)
+    }
+
+    pub fn film(&self) -> &Film {
+        &self.film
+    }
+
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    pub fn packed(&self) -> &PackedScene {
+        &self.packed
+    }
+
+    /// The film composited over the photograph.
+    pub fn picture(&self) -> Picture {
+        composite(&self.film, self.scene.photo.as_ref(), self.scene.settings.composite)
+    }
+
+    pub fn planes(&self) -> Planes {
+        planes(&self.film, self.scene.photo.as_ref())
+    }
+
+    pub fn rays(&self) -> RayTotals {
+        self.rays
+    }
+
+    pub fn seconds(&self) -> Seconds {
+        self.seconds
+    }
+
+    /// Things the user should hear: fallbacks taken, values fitted.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// "cpu" or "gpu".
+    pub fn backend_name(&self) -> &'static str {
+        match self.backend {
+            Backend::Cpu => "cpu",
+        }
+    }
+
+    /// The adapter's name, or the number of threads.
+    pub fn device_name(&self) -> String {
+        match &self.backend {
+            Backend::Cpu => format!("{} CPU threads", rayon::current_num_threads()),
+        }
+    }
+}

@@ -1,0 +1,35 @@
+// What estimator and vertex share: random numbers of a decision, weights, accumulation. Rust twin: src/cpu/contribution.rs.
+
+import package::bindings::frame;
+import package::sampler::{SampleKey, sample_4d};
+import package::state::{DELTA_DENSITY, MODE_REAL, MODE_SHARED, PathState};
+
+const SET_PRIMARY_ROULETTE: u32 = 1u;
+const SET_DIFFERENCE_LIGHT: u32 = 0u;
+const SET_DIFFERENCE_BSDF: u32 = 1u;
+const SET_DIFFERENCE_CONE: u32 = 2u;
+const SET_PATH_LIGHT: u32 = 3u;
+const SET_PATH_BSDF: u32 = 4u;
+
+fn draw(st: ptr<function, PathState>, purpose: u32) -> vec4<f32> {
+    return sample_4d(sample_key(st), 3u + (*st).depth * 5u + purpose);
+}
+
+fn sample_key(st: ptr<function, PathState>) -> SampleKey {
+    return SampleKey((*st).pixel, (*st).index, frame.rays_total, frame.seed, frame.sampler);
+}
+
+fn accumulate(st: ptr<function, PathState>, light: vec3<f32>) {
+    @if(paper) {
+        if (*st).mode != MODE_REAL { (*st).radiance += light; }
+        if (*st).mode == MODE_REAL || (*st).mode == MODE_SHARED { (*st).radiance_real += light; }
+    }
+    @if(!paper) {
+        (*st).radiance += light;
+    }
+}
+
+fn density_weight(density: f32, pdf: f32) -> f32 {
+    if density == DELTA_DENSITY { return 1.0; }
+    return density / (density + pdf);
+}

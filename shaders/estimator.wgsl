@@ -1,0 +1,315 @@
+// The estimator as a state machine. Rust twin: src/cpu/estimator.rs, where the method is described.
+
+import package::bindings::{NONE, frame, pixels, FRAME_AOVS, FRAME_ENV_DRAWN, PIXEL_BEAM_MAY_MEET_VIRTUAL};
+import package::bsdf::bsdf_albedo;
+import package::cones::cone_pdf;
+import package::contribution::{SET_PRIMARY_ROULETTE, accumulate, density_weight, sample_key};
+import package::environment::env_radiance;
+import package::lens::camera_ray;
+import package::lights::env_pdf;
+import package::math::dot3;
+import package::sampler::sample_4d;
+import package::state::{
+    DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_REAL,
+    PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_REAL,
+    REQUEST_CLOSEST_VIRTUAL, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
+    REQUEST_VIRTUAL_THEN_REAL, STAGE_DIFFERENCE_BSDF, STAGE_DIFFERENCE_CONE, STAGE_DIFFERENCE_SHADOW, STAGE_DONE,
+    STAGE_PAPER_BEHIND, STAGE_PATH, STAGE_PATH_SHADOW, STAGE_PRIMARY_REAL, STAGE_PRIMARY_VIRTUAL, STAGE_REAL_PASS, miss, path_state,
+};
+import package::surface::{Surface, surface_at};
+import package::trace::Hit;
+import package::vertex::shade_vertex;
+
+const COINCIDENCE: f32 = 1e-5;
+
+fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
+    var st = path_state(pixel, index);
+    let u = sample_4d(sample_key(&st), 0u);
+    let x = f32(pixel % frame.width) + u.x;
+    let y = f32(pixel / frame.width) + u.y;
+    let ray = camera_ray(x, y, u.z, u.w);
+    st.position = ray.origin;
+    st.direction = ray.direction;
+    let may_meet_virtual = (pixels[pixel].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u;
+    st.rays.primary = 1u;
+    if is_real_pass {
+        st.stage = STAGE_REAL_PASS;
+        st.request = select(REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_EACH, may_meet_virtual);
+        return st;
+    }
+    @if(paper) {
+        st.mode = MODE_SHARED;
+        st.stage = STAGE_PATH;
+        st.request = REQUEST_CLOSEST_MIXED;
+    }
+    @if(!paper) {
+        if may_meet_virtual {
+            st.stage = STAGE_PRIMARY_VIRTUAL;
+            st.request = REQUEST_CLOSEST_VIRTUAL;
+        } else {
+            primary_missed_virtual(&st);
+        }
+    }
+    return st;
+}
+
+// Consumes the hits in the state and either asks for the next ray or finishes the sample.
+fn advance(st: ptr<function, PathState>) {
+    var goes_on = true;
+    switch (*st).stage {
+        case STAGE_PRIMARY_VIRTUAL: { goes_on = primary_virtual(st); }
+        case STAGE_PRIMARY_REAL: { primary_real(st); }
+        case STAGE_PATH: { goes_on = path_hit(st); }
+        case STAGE_PATH_SHADOW: { path_shadow(st); }
+        case STAGE_PAPER_BEHIND: { paper_behind(st); }
+        case STAGE_DIFFERENCE_SHADOW: {
+            if shadow_counts(st) { (*st).radiance += (*st).shadow_contribution; }
+        }
+        case STAGE_DIFFERENCE_CONE: {
+            if virtual_is_nearer((*st).hit_virtual, (*st).hit_real) { split_difference(st); }
+        }
+        case STAGE_DIFFERENCE_BSDF: { difference_bsdf(st); }
+        case STAGE_REAL_PASS: { real_pass(st); }
+        default: {}
+    }
+    if goes_on { resume(st); }
+}
+
+fn virtual_is_nearer(hit_virtual: Hit, hit_real: Hit) -> bool {
+    if hit_virtual.triangle == NONE { return false; }
+    return hit_real.triangle == NONE || hit_virtual.t <= hit_real.t * (1.0 + COINCIDENCE);
+}
+
+fn primary_missed_virtual(st: ptr<function, PathState>) {
+    let probability = pixels[(*st).pixel].difference_probability;
+    var survives = true;
+    if probability < 1.0 {
+        let u = sample_4d(sample_key(st), SET_PRIMARY_ROULETTE);
+        survives = u.x < probability;
+    }
+    (*st).throughput = vec3<f32>(select(0.0, 1.0 / probability, survives));
+    if survives || (frame.flags & FRAME_AOVS) != 0u {
+        (*st).stage = STAGE_PRIMARY_REAL;
+        (*st).request = REQUEST_CLOSEST_REAL;
+        (*st).hit_virtual = miss();
+    } else {
+        (*st).stage = STAGE_DONE;
+    }
+}
+
+// False: the state already asks for its next ray, or is done.
+fn primary_virtual(st: ptr<function, PathState>) -> bool {
+    if (*st).hit_virtual.triangle == NONE {
+        primary_missed_virtual(st);
+    } else {
+        (*st).stage = STAGE_PRIMARY_REAL;
+        (*st).request = REQUEST_CLOSEST_REAL;
+        (*st).t_max = (*st).hit_virtual.t;
+    }
+    return false;
+}
+
+fn primary_real(st: ptr<function, PathState>) {
+    (*st).depth = 1u;
+    if virtual_is_nearer((*st).hit_virtual, (*st).hit_real) {
+        (*st).mask = 1u;
+        (*st).mode = MODE_MIXED;
+        plan_vertex(st, (*st).hit_virtual);
+    } else if (*st).hit_real.triangle != NONE {
+        (*st).mode = MODE_DIFFERENCE;
+        plan_vertex(st, (*st).hit_real);
+    }
+}
+
+fn plan_vertex(st: ptr<function, PathState>, hit: Hit) {
+    (*st).pending |= PENDING_VERTEX;
+    (*st).vertex_hit = hit;
+}
+
+fn record_first_hit(st: ptr<function, PathState>, s: Surface) {
+    (*st).depth_m = -dot3(s.position - frame.camera_position.xyz, frame.camera_back.xyz);
+    (*st).normal = s.ns;
+    (*st).albedo = bsdf_albedo(s, -(*st).direction);
+}
+
+fn resume(st: ptr<function, PathState>) {
+    loop {
+        if ((*st).pending & PENDING_VERTEX) != 0u {
+            (*st).pending &= ~PENDING_VERTEX;
+            let s = surface_at((*st).vertex_hit, (*st).direction);
+            if (frame.flags & FRAME_AOVS) != 0u && (*st).depth == 1u && (*st).depth_m == FAR {
+                record_first_hit(st, s);
+            }
+            shade_vertex(st, s);
+            continue;
+        }
+        if ((*st).pending & PENDING_SHADOW) != 0u {
+            (*st).pending &= ~PENDING_SHADOW;
+            (*st).request = (*st).shadow_request;
+            (*st).direction = (*st).shadow_direction;
+            (*st).t_max = (*st).shadow_t_max;
+            (*st).stage = select(STAGE_PATH_SHADOW, STAGE_DIFFERENCE_SHADOW, (*st).mode == MODE_DIFFERENCE);
+            return;
+        }
+        if ((*st).pending & PENDING_NEXT) != 0u {
+            (*st).pending &= ~PENDING_NEXT;
+            (*st).direction = (*st).next_direction;
+            (*st).density = (*st).next_density;
+            (*st).throughput = (*st).next_throughput;
+            (*st).t_max = FAR;
+            if (*st).mode == MODE_DIFFERENCE {
+                (*st).stage = STAGE_DIFFERENCE_CONE;
+                (*st).request = REQUEST_VIRTUAL_THEN_REAL;
+            } else {
+                (*st).stage = STAGE_PATH;
+                (*st).request = select(REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_REAL, (*st).mode == MODE_REAL);
+            }
+            return;
+        }
+        if ((*st).pending & PENDING_REAL) != 0u {
+            (*st).pending &= ~PENDING_REAL;
+            (*st).mode = MODE_REAL;
+            (*st).medium = NONE;
+            (*st).depth = (*st).real_depth;
+            (*st).direction = (*st).real_direction;
+            (*st).density = (*st).real_density;
+            (*st).throughput = (*st).real_throughput;
+            plan_vertex(st, (*st).real_hit);
+            continue;
+        }
+        if ((*st).pending & PENDING_DIFFERENCE) != 0u {
+            (*st).pending &= ~PENDING_DIFFERENCE;
+            (*st).mode = MODE_DIFFERENCE;
+            (*st).medium = NONE;
+            (*st).position = (*st).difference_position;
+            (*st).offset = (*st).difference_offset;
+            (*st).side = 0u;
+            (*st).real_t_min = (*st).difference_t_min;
+            (*st).direction = (*st).difference_direction;
+            (*st).density = (*st).difference_density;
+            (*st).throughput = (*st).difference_throughput;
+            (*st).depth = (*st).difference_depth;
+            (*st).t_max = FAR;
+            (*st).stage = STAGE_DIFFERENCE_BSDF;
+            (*st).request = select(REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, (*st).difference_lambertian != 0u);
+            return;
+        }
+        (*st).stage = STAGE_DONE;
+        return;
+    }
+}
+
+fn path_hit(st: ptr<function, PathState>) -> bool {
+    let virtual_first = (*st).mode != MODE_REAL && virtual_is_nearer((*st).hit_virtual, (*st).hit_real);
+    var hit = (*st).hit_real;
+    if virtual_first { hit = (*st).hit_virtual; }
+    (*st).depth += 1u;
+    if hit.triangle == NONE {
+        path_escape(st);
+        return true;
+    }
+    @if(paper) {
+        if (*st).mode == MODE_SHARED && virtual_first {
+            if (*st).depth == 1u { (*st).mask = 1u; }
+            (*st).stage = STAGE_PAPER_BEHIND;
+            (*st).request = REQUEST_CLOSEST_REAL;
+            return false;
+        }
+    }
+    plan_vertex(st, hit);
+    return true;
+}
+
+fn paper_behind(st: ptr<function, PathState>) {
+    if (*st).hit_real.triangle != NONE {
+        (*st).pending |= PENDING_REAL;
+        (*st).real_hit = (*st).hit_real;
+        (*st).real_direction = (*st).direction;
+        (*st).real_density = (*st).density;
+        (*st).real_throughput = (*st).throughput;
+        (*st).real_depth = (*st).depth;
+    } else {
+        (*st).mode = MODE_REAL;
+        path_escape(st);
+    }
+    (*st).mode = MODE_MIXED;
+    plan_vertex(st, (*st).hit_virtual);
+}
+
+fn path_escape(st: ptr<function, PathState>) {
+    if (*st).depth == 1u && (frame.flags & FRAME_ENV_DRAWN) == 0u { return; }
+    let weight = density_weight((*st).density, env_pdf((*st).direction));
+    accumulate(st, (*st).throughput * env_radiance((*st).direction) * weight);
+}
+
+fn path_shadow(st: ptr<function, PathState>) {
+    let open_virtual = (*st).hit_virtual.triangle == NONE;
+    let open_real = (*st).hit_real.triangle == NONE;
+    @if(paper) {
+        if (*st).mode == MODE_SHARED {
+            if (*st).shadow_request == REQUEST_SHADOW_PAIR {
+                if open_virtual { (*st).radiance += (*st).shadow_contribution; }
+                if open_real { (*st).radiance_real += (*st).shadow_contribution; }
+            } else if open_virtual && open_real {
+                (*st).radiance += (*st).shadow_contribution;
+            }
+            return;
+        }
+    }
+    if open_virtual && open_real { accumulate(st, (*st).shadow_contribution); }
+}
+
+fn shadow_counts(st: ptr<function, PathState>) -> bool {
+    let open_real = (*st).hit_real.triangle == NONE;
+    let open_virtual = (*st).hit_virtual.triangle == NONE;
+    if (*st).shadow_request == REQUEST_SHADOW_DIFFERENCE { return !open_virtual && open_real; }
+    return open_virtual && open_real;
+}
+
+fn difference_bsdf(st: ptr<function, PathState>) {
+    if virtual_is_nearer((*st).hit_virtual, (*st).hit_real) {
+        if (*st).difference_lambertian == 0u {
+            if (*st).density != DELTA_DENSITY {
+                let total = (*st).density + vertex_cone_density(st);
+                (*st).throughput *= (*st).density / total;
+                (*st).density = total;
+            }
+            split_difference(st);
+        }
+    } else if (*st).hit_real.triangle != NONE && (*st).depth < frame.max_bounces {
+        (*st).depth += 1u;
+        plan_vertex(st, (*st).hit_real);
+    }
+}
+
+fn vertex_cone_density(st: ptr<function, PathState>) -> f32 {
+    return (*st).difference_cone_probability * cone_pdf((*st).position, (*st).difference_normal, (*st).direction);
+}
+
+fn split_difference(st: ptr<function, PathState>) {
+    if (*st).hit_real.triangle == NONE {
+        let weight = density_weight((*st).density, env_pdf((*st).direction));
+        (*st).radiance -= (*st).throughput * env_radiance((*st).direction) * weight;
+    } else {
+        (*st).pending |= PENDING_REAL;
+        (*st).real_hit = (*st).hit_real;
+        (*st).real_direction = (*st).direction;
+        (*st).real_density = (*st).density;
+        (*st).real_throughput = -(*st).throughput;
+        (*st).real_depth = (*st).depth + 1u;
+    }
+    (*st).mode = MODE_MIXED;
+    (*st).depth += 1u;
+    plan_vertex(st, (*st).hit_virtual);
+}
+
+fn real_pass(st: ptr<function, PathState>) {
+    if virtual_is_nearer((*st).hit_virtual, (*st).hit_real) { (*st).mask = 1u; }
+    (*st).mode = MODE_REAL;
+    (*st).depth = 1u;
+    if (*st).hit_real.triangle == NONE {
+        path_escape(st);
+    } else {
+        plan_vertex(st, (*st).hit_real);
+    }
+}

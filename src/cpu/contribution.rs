@@ -1,0 +1,43 @@
+//! What estimator and vertex share: random numbers of a decision, weights, accumulation. WGSL twin: `shaders/contribution.wgsl`.
+
+use glam::Vec3;
+
+use super::state::*;
+use crate::camera::sampler::{SampleKey, sample_4d};
+use crate::packed::PackedScene;
+
+// Sample sets: 0 is pixel and lens, 1 the primary roulette, then five a depth from 8 on.
+pub const SET_PRIMARY_ROULETTE: u32 = 1;
+pub const SET_DIFFERENCE_LIGHT: u32 = 0;
+pub const SET_DIFFERENCE_BSDF: u32 = 1;
+pub const SET_DIFFERENCE_CONE: u32 = 2;
+pub const SET_PATH_LIGHT: u32 = 3;
+pub const SET_PATH_BSDF: u32 = 4;
+
+pub const ESTIMATOR_DIRECT: u32 = 0;
+pub const ESTIMATOR_PAPER: u32 = 1;
+
+/// Random numbers of one decision at the present vertex.
+pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> [f32; 4] {
+    sample_4d(sample_key(scene, st), 3 + st.depth * 5 + purpose)
+}
+
+pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {
+    SampleKey { pixel: st.pixel, index: st.index, total: scene.frame.rays_total, seed: scene.frame.seed, sampler: scene.frame.sampler }
+}
+
+/// Adds light to what the present mode accumulates into.
+pub fn accumulate(scene: &PackedScene, st: &mut PathState, light: Vec3) {
+    let paper = scene.frame.estimator == ESTIMATOR_PAPER;
+    if !(paper && st.mode == MODE_REAL) {
+        st.radiance += light;
+    }
+    if paper && (st.mode == MODE_REAL || st.mode == MODE_SHARED) {
+        st.radiance_real += light;
+    }
+}
+
+/// Balance heuristic of a direction drawn with `density` against the light technique's `pdf`.
+pub fn density_weight(density: f32, pdf: f32) -> f32 {
+    if density == DELTA_DENSITY { 1.0 } else { density / (density + pdf) }
+}

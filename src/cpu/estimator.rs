@@ -1,0 +1,340 @@
+//! The estimator as a state machine: what a sample does with the hits it asked for. WGSL twin: `shaders/estimator.wgsl`.
+//!
+//! `direct` estimates the difference D = Im - Ir where it arises (docs/estimator.md): at a real vertex, (a) lights that virtual geometry blocks
+//! or that are virtual, (b) directions inside the cones of the virtual bounding spheres, (c) the recursion along the BSDF. `paper` follows the
+//! four ray kinds and four rules of Kan & Kaufmann 2012.
+
+use glam::Vec3;
+
+use super::contribution::*;
+use super::state::*;
+use super::vertex::shade_vertex;
+use crate::accel::Hit;
+use crate::camera::lens::camera_ray;
+use crate::camera::sampler::sample_4d;
+use crate::light::cones::cone_pdf;
+use crate::light::environment::env_radiance;
+use crate::light::lights::env_pdf;
+use crate::material::{Surface, bsdf_albedo, surface_at};
+use crate::packed::{FRAME_AOVS, FRAME_ENV_DRAWN, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene};
+
+/// A virtual hit counts as nearer within this relative distance, so that a base lying in the table's plane covers the table.
+const COINCIDENCE: f32 = 1e-5;
+
+/// Sets up the primary ray. `real_pass` renders the real radiance and the mask alone, for pixels that need Ir.
+pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool) -> PathState {
+    let mut st = PathState::new(pixel, index);
+    let u = sample_4d(sample_key(scene, &st), 0);
+    let x = (pixel % scene.frame.width) as f32 + u[0];
+    let y = (pixel / scene.frame.width) as f32 + u[1];
+    let ray = camera_ray(&scene.frame, x, y, u[2], u[3]);
+    st.position = ray.origin;
+    st.direction = ray.direction;
+    let may_meet_virtual = scene.pixels[pixel as usize].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0;
+    if real_pass {
+        st.stage = STAGE_REAL_PASS;
+        st.request = if may_meet_virtual { REQUEST_CLOSEST_EACH } else { REQUEST_CLOSEST_REAL };
+    } else if scene.frame.estimator == ESTIMATOR_PAPER {
+        st.mode = MODE_SHARED;
+        st.stage = STAGE_PATH;
+        st.request = REQUEST_CLOSEST_MIXED;
+    } else if may_meet_virtual {
+        st.stage = STAGE_PRIMARY_VIRTUAL;
+        st.request = REQUEST_CLOSEST_VIRTUAL;
+    } else {
+        primary_missed_virtual(scene, &mut st);
+    }
+    st.rays.primary = 1;
+    st
+}
+
+/// Consumes the hits in `st` and either asks for the next ray or finishes the sample.
+pub fn advance(scene: &PackedScene, st: &mut PathState) {
+    let mut goes_on = true;
+    match st.stage {
+        STAGE_PRIMARY_VIRTUAL => goes_on = primary_virtual(scene, st),
+        STAGE_PRIMARY_REAL => primary_real(st),
+        STAGE_PATH => goes_on = path_hit(scene, st),
+        STAGE_PATH_SHADOW => path_shadow(scene, st),
+        STAGE_PAPER_BEHIND => paper_behind(scene, st),
+        STAGE_DIFFERENCE_SHADOW => {
+            if shadow_counts(st) {
+                st.radiance += st.shadow_contribution;
+            }
+        }
+        STAGE_DIFFERENCE_CONE => {
+            // Counts only where virtual geometry is nearer.
+            if virtual_is_nearer(st.hit_virtual, st.hit_real) {
+                split_difference(scene, st);
+            }
+        }
+        STAGE_DIFFERENCE_BSDF => difference_bsdf(scene, st),
+        STAGE_REAL_PASS => real_pass(scene, st),
+        _ => {}
+    }
+    if goes_on {
+        resume(scene, st);
+    }
+}
+
+/// True where the virtual hit covers the real one.
+fn virtual_is_nearer(hit_virtual: Hit, hit_real: Hit) -> bool {
+    hit_virtual.triangle != NONE && hit_virtual.t <= hit_real.t * (1.0 + COINCIDENCE)
+}
+
+/// The beam met nothing virtual: the difference is evaluated with the pixel's probability, before the real ray is paid for.
+fn primary_missed_virtual(scene: &PackedScene, st: &mut PathState) {
+    let probability = scene.pixels[st.pixel as usize].difference_probability;
+    let mut survives = true;
+    if probability < 1.0 {
+        let u = sample_4d(sample_key(scene, st), SET_PRIMARY_ROULETTE);
+        survives = u[0] < probability;
+    }
+    st.throughput = if survives { Vec3::splat(1.0 / probability) } else { Vec3::ZERO };
+    if survives || scene.frame.flags & FRAME_AOVS != 0 {
+        st.stage = STAGE_PRIMARY_REAL;
+        st.request = REQUEST_CLOSEST_REAL;
+        st.hit_virtual = MISS;
+    } else {
+        st.stage = STAGE_DONE;
+    }
+}
+
+/// False: the state already asks for its next ray, or is done.
+fn primary_virtual(scene: &PackedScene, st: &mut PathState) -> bool {
+    if st.hit_virtual.triangle == NONE {
+        primary_missed_virtual(scene, st);
+    } else {
+        st.stage = STAGE_PRIMARY_REAL;
+        st.request = REQUEST_CLOSEST_REAL;
+        st.t_max = st.hit_virtual.t;
+    }
+    false
+}
+
+fn primary_real(st: &mut PathState) {
+    st.depth = 1;
+    if virtual_is_nearer(st.hit_virtual, st.hit_real) {
+        st.mask = 1;
+        st.mode = MODE_MIXED;
+        plan_vertex(st, st.hit_virtual);
+    } else if st.hit_real.triangle != NONE {
+        // Without throughput the roulette has ended the sample, and the vertex only fills the planes.
+        st.mode = MODE_DIFFERENCE;
+        plan_vertex(st, st.hit_real);
+    }
+}
+
+fn plan_vertex(st: &mut PathState, hit: Hit) {
+    st.pending |= PENDING_VERTEX;
+    st.vertex_hit = hit;
+}
+
+fn record_first_hit(scene: &PackedScene, st: &mut PathState, s: &Surface) {
+    let back = Vec3::from_slice(&scene.frame.camera_back[..3]);
+    let camera = Vec3::from_slice(&scene.frame.camera_position[..3]);
+    st.depth_m = -(s.position - camera).dot(back);
+    st.normal = s.ns;
+    st.albedo = bsdf_albedo(s, -st.direction);
+}
+
+/// Moves on to whatever is still pending; the sample ends when nothing is.
+fn resume(scene: &PackedScene, st: &mut PathState) {
+    loop {
+        if st.pending & PENDING_VERTEX != 0 {
+            st.pending &= !PENDING_VERTEX;
+            let s = surface_at(scene, st.vertex_hit, st.direction);
+            if scene.frame.flags & FRAME_AOVS != 0 && st.depth == 1 && st.depth_m == f32::INFINITY {
+                record_first_hit(scene, st, &s);
+            }
+            shade_vertex(scene, st, &s);
+            continue;
+        }
+        if st.pending & PENDING_SHADOW != 0 {
+            st.pending &= !PENDING_SHADOW;
+            st.request = st.shadow_request;
+            st.direction = st.shadow_direction;
+            st.t_max = st.shadow_t_max;
+            st.stage = if st.mode == MODE_DIFFERENCE { STAGE_DIFFERENCE_SHADOW } else { STAGE_PATH_SHADOW };
+            return;
+        }
+        if st.pending & PENDING_NEXT != 0 {
+            st.pending &= !PENDING_NEXT;
+            st.direction = st.next_direction;
+            st.density = st.next_density;
+            st.throughput = st.next_throughput;
+            st.t_max = f32::INFINITY;
+            if st.mode == MODE_DIFFERENCE {
+                st.stage = STAGE_DIFFERENCE_CONE;
+                st.request = REQUEST_VIRTUAL_THEN_REAL;
+            } else {
+                st.stage = STAGE_PATH;
+                st.request = if st.mode == MODE_REAL { REQUEST_CLOSEST_REAL } else { REQUEST_CLOSEST_MIXED };
+            }
+            return;
+        }
+        if st.pending & PENDING_REAL != 0 {
+            st.pending &= !PENDING_REAL;
+            st.mode = MODE_REAL;
+            st.medium = NONE;
+            st.depth = st.real_depth;
+            st.direction = st.real_direction;
+            st.density = st.real_density;
+            st.throughput = st.real_throughput;
+            plan_vertex(st, st.real_hit);
+            continue;
+        }
+        if st.pending & PENDING_DIFFERENCE != 0 {
+            st.pending &= !PENDING_DIFFERENCE;
+            st.mode = MODE_DIFFERENCE;
+            st.medium = NONE;
+            st.position = st.difference_position;
+            st.offset = st.difference_offset;
+            st.side = 0;
+            st.real_t_min = st.difference_t_min;
+            st.direction = st.difference_direction;
+            st.density = st.difference_density;
+            st.throughput = st.difference_throughput;
+            st.depth = st.difference_depth;
+            st.t_max = f32::INFINITY;
+            st.stage = STAGE_DIFFERENCE_BSDF;
+            st.request = if st.difference_lambertian { REQUEST_REAL_UNLESS_COVERED } else { REQUEST_CLOSEST_EACH };
+            return;
+        }
+        st.stage = STAGE_DONE;
+        return;
+    }
+}
+
+/// The next vertex of a path, or its escape. False: the state already asks for its next ray.
+fn path_hit(scene: &PackedScene, st: &mut PathState) -> bool {
+    let virtual_first = st.mode != MODE_REAL && virtual_is_nearer(st.hit_virtual, st.hit_real);
+    let hit = if virtual_first { st.hit_virtual } else { st.hit_real };
+    st.depth += 1;
+    if hit.triangle == NONE {
+        path_escape(scene, st);
+        return true;
+    }
+    if st.mode == MODE_SHARED && virtual_first {
+        // Rule 3 of the paper: a real ray continues in the same direction behind the virtual hit.
+        if st.depth == 1 {
+            st.mask = 1;
+        }
+        st.stage = STAGE_PAPER_BEHIND;
+        st.request = REQUEST_CLOSEST_REAL;
+        return false;
+    }
+    plan_vertex(st, hit);
+    true
+}
+
+fn paper_behind(scene: &PackedScene, st: &mut PathState) {
+    if st.hit_real.triangle != NONE {
+        st.pending |= PENDING_REAL;
+        st.real_hit = st.hit_real;
+        st.real_direction = st.direction;
+        st.real_density = st.density;
+        st.real_throughput = st.throughput;
+        st.real_depth = st.depth;
+    } else {
+        st.mode = MODE_REAL;
+        path_escape(scene, st);
+    }
+    st.mode = MODE_MIXED;
+    plan_vertex(st, st.hit_virtual);
+}
+
+/// A path left the scene: the environment, weighted against the technique that samples it as a light.
+fn path_escape(scene: &PackedScene, st: &mut PathState) {
+    if st.depth == 1 && scene.frame.flags & FRAME_ENV_DRAWN == 0 {
+        return;
+    }
+    let weight = density_weight(st.density, env_pdf(scene, st.direction));
+    let light = st.throughput * env_radiance(scene, st.direction) * weight;
+    accumulate(scene, st, light);
+}
+
+fn path_shadow(scene: &PackedScene, st: &mut PathState) {
+    let open_virtual = st.hit_virtual.triangle == NONE;
+    let open_real = st.hit_real.triangle == NONE;
+    if st.mode == MODE_SHARED {
+        if st.shadow_request == REQUEST_SHADOW_PAIR {
+            // hit_real answers the real shadow ray, hit_virtual the mixed one.
+            if open_virtual {
+                st.radiance += st.shadow_contribution;
+            }
+            if open_real {
+                st.radiance_real += st.shadow_contribution;
+            }
+        } else if open_virtual && open_real {
+            st.radiance += st.shadow_contribution;
+        }
+        return;
+    }
+    if open_virtual && open_real {
+        let light = st.shadow_contribution;
+        accumulate(scene, st, light);
+    }
+}
+
+/// A difference shadow ray contributes where only something virtual blocks a real light, or where nothing blocks a virtual one.
+fn shadow_counts(st: &PathState) -> bool {
+    let open_real = st.hit_real.triangle == NONE;
+    let open_virtual = st.hit_virtual.triangle == NONE;
+    if st.shadow_request == REQUEST_SHADOW_DIFFERENCE { !open_virtual && open_real } else { open_virtual && open_real }
+}
+
+/// A direction drawn from the BSDF: the recursion where real geometry is nearer, the other half of (b) where virtual geometry is.
+fn difference_bsdf(scene: &PackedScene, st: &mut PathState) {
+    if virtual_is_nearer(st.hit_virtual, st.hit_real) {
+        if !st.difference_lambertian {
+            if st.density != DELTA_DENSITY {
+                // The cones could have drawn it too: the balance heuristic divides by the sum.
+                let total = st.density + vertex_cone_density(scene, st);
+                st.throughput *= st.density / total;
+                st.density = total;
+            }
+            split_difference(scene, st);
+        }
+    } else if st.hit_real.triangle != NONE && st.depth < scene.frame.max_bounces {
+        st.depth += 1;
+        plan_vertex(st, st.hit_real);
+    }
+}
+
+/// Effective density of the cone technique at the vertex that the present ray leaves.
+fn vertex_cone_density(scene: &PackedScene, st: &PathState) -> f32 {
+    st.difference_cone_probability * cone_pdf(&scene.frame, st.position, st.difference_normal, st.direction)
+}
+
+/// Virtual geometry is nearer: its radiance counts, and what the real world shows behind it is taken away.
+fn split_difference(scene: &PackedScene, st: &mut PathState) {
+    if st.hit_real.triangle == NONE {
+        let weight = density_weight(st.density, env_pdf(scene, st.direction));
+        st.radiance -= st.throughput * env_radiance(scene, st.direction) * weight;
+    } else {
+        st.pending |= PENDING_REAL;
+        st.real_hit = st.hit_real;
+        st.real_direction = st.direction;
+        st.real_density = st.density;
+        st.real_throughput = -st.throughput;
+        st.real_depth = st.depth + 1;
+    }
+    st.mode = MODE_MIXED;
+    st.depth += 1;
+    plan_vertex(st, st.hit_virtual);
+}
+
+/// Real pass: the real radiance along the primary ray, and whether something virtual covers it.
+fn real_pass(scene: &PackedScene, st: &mut PathState) {
+    if virtual_is_nearer(st.hit_virtual, st.hit_real) {
+        st.mask = 1;
+    }
+    st.mode = MODE_REAL;
+    st.depth = 1;
+    if st.hit_real.triangle == NONE {
+        path_escape(scene, st);
+    } else {
+        plan_vertex(st, st.hit_real);
+    }
+}

@@ -1,0 +1,194 @@
+//! The buffers of a batch of samples in flight: bind group 1, as `shaders/lanes.wgsl` declares it.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::{GpuDevice, GpuError, PixelWork};
+use crate::film::{GuideSums, PixelSums};
+
+/// Twin of the shader's `Batch`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Batch {
+    pub pixel_count: u32,
+    pub lane_count: u32,
+    pub sample_offset: u32,
+    pub sample_count: u32,
+    pub real_pass: u32,
+    pub with_guides: u32,
+    /// Stays 0; the shader hides intermediate sums from the compiler with it.
+    pub zero: u32,
+    pub pad: u32,
+}
+
+/// What the device counts while a batch runs.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Counters {
+    pub lanes_in: u32,
+    pub lanes_out: u32,
+    pub steps: u32,
+    /// Primary, mixed, real, mixed shadow, real shadow.
+    pub rays: [u32; 5],
+}
+
+pub const COUNTERS_BYTES: u64 = size_of::<Counters>() as u64;
+const SUMS_BYTES: u64 = size_of::<PixelSums>() as u64;
+const GUIDE_BYTES: u64 = size_of::<GuideSums>() as u64;
+const WORK_BYTES: u64 = size_of::<PixelWork>() as u64;
+
+/// Buffers for up to `capacity` lanes.
+pub struct Lanes {
+    pub capacity: usize,
+    pub with_guides: bool,
+    pub batch: wgpu::Buffer,
+    pub work: wgpu::Buffer,
+    pub paths: wgpu::Buffer,
+    pub queues: [wgpu::Buffer; 2],
+    pub counters: wgpu::Buffer,
+    pub indirect: wgpu::Buffer,
+    pub pixel_sums: wgpu::Buffer,
+    pub guide_sums: wgpu::Buffer,
+    /// Counters, then sums, then guides.
+    pub staging: wgpu::Buffer,
+}
+
+/// As many lanes as the device can bind, with `path_bytes` for the state of one.
+pub fn most_lanes(gpu: &GpuDevice, path_bytes: u64) -> usize {
+    let largest = path_bytes.max(SUMS_BYTES + GUIDE_BYTES + COUNTERS_BYTES);
+    let bindable = gpu
+        .limits
+        .max_storage_buffer_binding_size
+        .min(gpu.limits.max_buffer_size)
+        / largest;
+    let dispatchable = u64::from(gpu.limits.max_compute_workgroups_per_dimension) * 64;
+    bindable.min(dispatchable) as usize
+}
+
+impl Lanes {
+    /// # Errors
+    /// [`GpuError::Limit`] if the device has no memory for them.
+    pub fn new(
+        gpu: &GpuDevice,
+        capacity: usize,
+        path_bytes: u64,
+        with_guides: bool,
+    ) -> Result<Self, GpuError> {
+        use wgpu::BufferUsages as Usage;
+        let count = capacity as u64;
+        let guides = if with_guides { count } else { 1 };
+        let make = |label, size, usage| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let filled = Usage::STORAGE | Usage::COPY_DST;
+        let both = filled | Usage::COPY_SRC;
+        let queue = || make("queue", 4 * count, Usage::STORAGE);
+        gpu.catching(|| Self {
+            capacity,
+            with_guides,
+            batch: make(
+                "batch",
+                size_of::<Batch>() as u64,
+                Usage::UNIFORM | Usage::COPY_DST,
+            ),
+            work: make("work", WORK_BYTES * count, filled),
+            paths: make("paths", path_bytes * count, Usage::STORAGE),
+            queues: [queue(), queue()],
+            counters: make("counters", COUNTERS_BYTES, both),
+            indirect: make("indirect", 12, Usage::STORAGE | Usage::INDIRECT),
+            pixel_sums: make("pixel sums", SUMS_BYTES * count, both),
+            guide_sums: make("guide sums", GUIDE_BYTES * guides, both),
+            staging: make(
+                "staging",
+                COUNTERS_BYTES + SUMS_BYTES * count + GUIDE_BYTES * guides,
+                Usage::MAP_READ | Usage::COPY_DST,
+            ),
+        })
+        .map_err(|error| GpuError::Limit {
+            what: format!("a batch of {capacity} samples"),
+            needed: format!("{} MiB", (count * path_bytes) >> 20),
+            available: format!("memory ({error})"),
+            adapter: gpu.name(),
+            advice: "render with --backend cpu",
+        })
+    }
+
+    /// The buffer of a binding of group 1; `parity` says which queue is read.
+    pub fn get(&self, binding: u32, parity: usize) -> Option<&wgpu::Buffer> {
+        Some(match binding {
+            0 => &self.batch,
+            1 => &self.work,
+            2 => &self.paths,
+            3 => &self.queues[parity],
+            4 => &self.queues[1 - parity],
+            5 => &self.counters,
+            6 => &self.indirect,
+            7 => &self.pixel_sums,
+            8 => &self.guide_sums,
+            _ => return None,
+        })
+    }
+
+    pub fn upload(
+        &self,
+        gpu: &GpuDevice,
+        work: &[PixelWork],
+        sums: &[PixelSums],
+        guides: &[GuideSums],
+    ) {
+        let write = |buffer, bytes| gpu.queue.write_buffer(buffer, 0, bytes);
+        write(&self.work, bytemuck::cast_slice(work));
+        write(&self.pixel_sums, bytemuck::cast_slice(sums));
+        write(&self.guide_sums, bytemuck::cast_slice(guides));
+    }
+
+    pub fn copy_counters(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.copy_buffer_to_buffer(&self.counters, 0, &self.staging, 0, COUNTERS_BYTES);
+    }
+
+    pub fn copy_sums(&self, encoder: &mut wgpu::CommandEncoder, pixels: usize) {
+        let sums = SUMS_BYTES * pixels as u64;
+        encoder.copy_buffer_to_buffer(&self.pixel_sums, 0, &self.staging, COUNTERS_BYTES, sums);
+        if self.with_guides {
+            let guides = GUIDE_BYTES * pixels as u64;
+            let to = COUNTERS_BYTES + sums;
+            encoder.copy_buffer_to_buffer(&self.guide_sums, 0, &self.staging, to, guides);
+        }
+    }
+
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn read_counters(&self, gpu: &GpuDevice) -> Result<Counters, GpuError> {
+        let bytes = gpu.read(&self.staging, COUNTERS_BYTES)?;
+        Ok(bytemuck::pod_read_unaligned(&bytes))
+    }
+
+    /// What [`Lanes::copy_counters`] and [`Lanes::copy_sums`] copied; no guides unless there are any.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn read_sums(
+        &self,
+        gpu: &GpuDevice,
+        pixels: usize,
+    ) -> Result<(Counters, Vec<PixelSums>, Vec<GuideSums>), GpuError> {
+        let sums = SUMS_BYTES * pixels as u64;
+        let guides = if self.with_guides {
+            GUIDE_BYTES * pixels as u64
+        } else {
+            0
+        };
+        let bytes = gpu.read(&self.staging, COUNTERS_BYTES + sums + guides)?;
+        let (counters, rest) = bytes.split_at(COUNTERS_BYTES as usize);
+        let (sums, guides) = rest.split_at(sums as usize);
+        Ok((
+            bytemuck::pod_read_unaligned(counters),
+            bytemuck::pod_collect_to_vec(sums),
+            bytemuck::pod_collect_to_vec(guides),
+        ))
+    }
+}

@@ -1,0 +1,444 @@
+//! Runs samples as a wavefront: a batch of them advances one step a dispatch, the finished ones leave the queue, and at the end one
+//! thread a pixel adds the samples to the pixel's sums in their order. What reaches the film does not depend on how the work was cut.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::kernel::{BindGroups, Kernel};
+use super::lanes::{Batch, Counters, Lanes, most_lanes};
+use super::pacer::Pacer;
+use super::profile::{
+    ACCUMULATE, ADVANCE, GENERATE, KERNELS, KernelSeconds, Profiler, TRACE, TURN,
+};
+use super::{Composer, Features, GpuDevice, GpuError, SceneBuffers, SceneParts};
+use crate::film::Film;
+use crate::packed::PackedScene;
+
+/// Samples of one pixel in a batch at most, so that a batch has pixels enough to sum in parallel.
+const MOST_SAMPLES: u32 = 256;
+/// No sample takes so many steps: at 64 bounces a difference chain with a path at each vertex stays under it.
+const MOST_STEPS: u32 = 100_000;
+
+/// Samples `first..end` of a pixel, which are the next ones of its sums.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct PixelWork {
+    /// Row-major index.
+    pub pixel: u32,
+    pub first: u32,
+    pub end: u32,
+    pub pad: u32,
+}
+
+impl PixelWork {
+    pub fn new(pixel: u32, samples: std::ops::Range<u32>) -> Self {
+        Self {
+            pixel,
+            first: samples.start,
+            end: samples.end,
+            pad: 0,
+        }
+    }
+
+    fn len(&self) -> u32 {
+        self.end.saturating_sub(self.first)
+    }
+}
+
+/// The estimator on one device, specialised to one scene.
+pub struct GpuBackend {
+    gpu: Arc<GpuDevice>,
+    scene: SceneBuffers,
+    features: Features,
+    kernels: Vec<Kernel>,
+    /// Bytes of the state of one sample.
+    path_bytes: u64,
+    lanes: Option<Lanes>,
+    /// By kernel and parity.
+    groups: Vec<[BindGroups; 2]>,
+    pacer: Pacer,
+    /// The first submission compiles the kernels, and says nothing about speed.
+    warm: bool,
+    profiler: Option<Profiler>,
+    batches_until_loss: Option<u32>,
+}
+
+/// One dispatch of a submission.
+struct Dispatch {
+    kernel: usize,
+    parity: usize,
+    /// None: as many as the queue has lanes.
+    workgroups: Option<u32>,
+}
+
+impl GpuBackend {
+    /// Uploads the scene and compiles kernels that do what it needs and no more.
+    ///
+    /// # Errors
+    /// [`GpuError::Limit`] if the scene does not fit the device.
+    pub fn new(gpu: Arc<GpuDevice>, scene: &PackedScene) -> Result<Self, GpuError> {
+        let buffers = SceneBuffers::from_parts(&gpu, &SceneParts::from(scene))?;
+        let features = Features::for_scene(scene);
+        Self::with_modules(gpu, &Composer::default(), &features, buffers)
+    }
+
+    /// Takes the scene as it is now; compiles again only if it needs other features than before.
+    ///
+    /// # Errors
+    /// As [`GpuBackend::new`].
+    pub fn set_scene(&mut self, scene: &PackedScene) -> Result<(), GpuError> {
+        let features = Features::for_scene(scene);
+        if features != self.features {
+            *self = Self::new(Arc::clone(&self.gpu), scene)?;
+            return Ok(());
+        }
+        self.scene = SceneBuffers::from_parts(&self.gpu, &SceneParts::from(scene))?;
+        // Bind groups name the old buffers.
+        self.lanes = None;
+        Ok(())
+    }
+
+    /// Compiles the kernels for `features` from `composer`'s modules; `scene` is what they read.
+    ///
+    /// # Errors
+    /// [`GpuError::Shader`], or [`GpuError::Limit`] if the adapter cannot run them.
+    pub fn with_modules(
+        gpu: Arc<GpuDevice>,
+        composer: &Composer,
+        features: &Features,
+        scene: SceneBuffers,
+    ) -> Result<Self, GpuError> {
+        let kernels = KERNELS
+            .iter()
+            .map(|entry_point| {
+                let wgsl = composer.compose("kernels", entry_point, features)?;
+                Kernel::new(&gpu, entry_point, &wgsl)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let path_bytes = kernels[ADVANCE]
+            .bindings()
+            .iter()
+            .find(|binding| (binding.group, binding.binding) == (1, 2))
+            .map_or(16, |binding| u64::from(binding.stride));
+        let pacer = Pacer::new(most_lanes(&gpu, path_bytes));
+        Ok(Self {
+            gpu,
+            scene,
+            features: *features,
+            kernels,
+            path_bytes,
+            lanes: None,
+            groups: Vec::new(),
+            pacer,
+            warm: false,
+            profiler: None,
+            batches_until_loss: None,
+        })
+    }
+
+    /// Name and driver of the device.
+    pub fn device_name(&self) -> String {
+        self.gpu.name()
+    }
+
+    /// Takes the time of every kernel from now on, which costs a pass for each dispatch; false where the device cannot.
+    pub fn profile(&mut self) -> bool {
+        self.profiler = Profiler::new(&self.gpu);
+        self.profiler.is_some()
+    }
+
+    /// Seconds by kernel since [`GpuBackend::profile`].
+    pub fn kernel_seconds(&self) -> Option<KernelSeconds> {
+        self.profiler.as_ref().map(|profiler| profiler.seconds)
+    }
+
+    /// For tests: the device is destroyed before its n-th batch from now.
+    #[doc(hidden)]
+    pub fn lose_device_after(&mut self, batches: u32) {
+        self.batches_until_loss = Some(batches);
+    }
+
+    /// Takes the samples of `work` and adds them to the film; of the real pass if `real_pass`. `keep_going` is told after each batch of
+    /// pixels how many are done and ends the pass by answering false. Returns the rays traced: primary, mixed, real, mixed shadow,
+    /// real shadow.
+    ///
+    /// Whatever the outcome, every pixel of the film has taken all of its samples of this pass or none.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`]: the film keeps what was finished before, and the same work on another backend goes on from there.
+    pub fn render(
+        &mut self,
+        film: &mut Film,
+        real_pass: bool,
+        work: &[PixelWork],
+        keep_going: &dyn Fn(u64) -> bool,
+    ) -> Result<[u64; 5], GpuError> {
+        let mut rays = [0; 5];
+        let mut rest = work;
+        while !rest.is_empty() {
+            let lanes = self.pacer.lanes();
+            let lanes = self.prepare(lanes, !film.guides.is_empty())?;
+            let (now, later) = rest.split_at(pixels_that_fit(rest, lanes));
+            let traced = self.render_pixels(film, real_pass, now)?;
+            for (sum, n) in rays.iter_mut().zip(traced) {
+                *sum += n;
+            }
+            rest = later;
+            if !keep_going(now.len() as u64) {
+                break;
+            }
+        }
+        Ok(rays)
+    }
+
+    /// Makes room for `wanted` lanes, or for as many as there is memory for; returns how many may be used.
+    fn prepare(&mut self, wanted: usize, with_guides: bool) -> Result<usize, GpuError> {
+        let present = match &self.lanes {
+            Some(lanes) if lanes.with_guides == with_guides => lanes.capacity,
+            _ => 0,
+        };
+        if present >= wanted {
+            return Ok(wanted);
+        }
+        match Lanes::new(&self.gpu, wanted, self.path_bytes, with_guides) {
+            Ok(lanes) => {
+                self.bind(&lanes)?;
+                self.lanes = Some(lanes);
+                Ok(wanted)
+            }
+            Err(GpuError::Limit { .. }) if present > 0 => Ok(present),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn bind(&mut self, lanes: &Lanes) -> Result<(), GpuError> {
+        let bind = |kernel: &Kernel, parity: usize| {
+            kernel.bind(&self.gpu, |group, binding| match group {
+                0 => self.scene.get(binding),
+                _ => lanes.get(binding, parity),
+            })
+        };
+        self.groups = self
+            .kernels
+            .iter()
+            .map(|kernel| Ok([bind(kernel, 0)?, bind(kernel, 1)?]))
+            .collect::<Result<_, GpuError>>()?;
+        Ok(())
+    }
+
+    /// All samples of a few pixels, from upload to film.
+    fn render_pixels(
+        &mut self,
+        film: &mut Film,
+        real_pass: bool,
+        work: &[PixelWork],
+    ) -> Result<[u64; 5], GpuError> {
+        let Some(lanes) = self.lanes.take() else {
+            return Err(GpuError::Lost("no lanes".to_owned()));
+        };
+        let outcome = self.render_pixels_on(&lanes, film, real_pass, work);
+        self.lanes = Some(lanes);
+        outcome
+    }
+
+    fn render_pixels_on(
+        &mut self,
+        lanes: &Lanes,
+        film: &mut Film,
+        real_pass: bool,
+        work: &[PixelWork],
+    ) -> Result<[u64; 5], GpuError> {
+        let gather = |pixel: &PixelWork| film.pixels[pixel.pixel as usize];
+        let sums: Vec<_> = work.iter().map(gather).collect();
+        let guides: Vec<_> = if lanes.with_guides {
+            work.iter().map(|w| film.guides[w.pixel as usize]).collect()
+        } else {
+            Vec::new()
+        };
+        lanes.upload(&self.gpu, work, &sums, &guides);
+
+        let longest = work.iter().map(PixelWork::len).max().unwrap_or(0);
+        let at_once = (lanes.capacity / work.len()).clamp(1, MOST_SAMPLES as usize) as u32;
+        let mut rays = [0; 5];
+        let mut sample_offset = 0;
+        while sample_offset < longest {
+            let sample_count = at_once.min(longest - sample_offset);
+            let batch = Batch {
+                pixel_count: work.len() as u32,
+                lane_count: work.len() as u32 * sample_count,
+                sample_offset,
+                sample_count,
+                real_pass: u32::from(real_pass),
+                with_guides: u32::from(lanes.with_guides && !real_pass),
+                ..Batch::default()
+            };
+            self.run_batch(lanes, &batch)?;
+            sample_offset += sample_count;
+            let counters =
+                self.finish_batch(lanes, &batch, film, work, sample_offset == longest)?;
+            for (sum, n) in rays.iter_mut().zip(counters.rays) {
+                *sum += u64::from(n);
+            }
+        }
+        Ok(rays)
+    }
+
+    /// Takes every sample of the batch to its end.
+    fn run_batch(&mut self, lanes: &Lanes, batch: &Batch) -> Result<(), GpuError> {
+        self.count_down_to_loss();
+        let queue = &self.gpu.queue;
+        queue.write_buffer(&lanes.batch, 0, bytemuck::bytes_of(batch));
+        let zero = Counters::default();
+        queue.write_buffer(&lanes.counters, 0, bytemuck::bytes_of(&zero));
+
+        // The first queue is written with parity 1, so that parity 0 reads it.
+        let mut parity = 0;
+        let mut dispatches = vec![Dispatch {
+            kernel: GENERATE,
+            parity: 1,
+            workgroups: Some(batch.lane_count.div_ceil(64)),
+        }];
+        let mut alive = batch.lane_count;
+        let mut steps_before = 0;
+        let mut steps = 0;
+        loop {
+            let count = self.pacer.steps(alive as usize);
+            for _ in 0..count {
+                for (kernel, workgroups) in [(TURN, Some(1)), (TRACE, None), (ADVANCE, None)] {
+                    dispatches.push(Dispatch {
+                        kernel,
+                        parity,
+                        workgroups,
+                    });
+                }
+                parity = 1 - parity;
+            }
+            let start = Instant::now();
+            let mut encoder = self.encode(lanes, &dispatches);
+            lanes.copy_counters(&mut encoder);
+            self.submit(encoder)?;
+            let counters = lanes.read_counters(&self.gpu)?;
+            self.take_times()?;
+            if self.warm {
+                let begun = if steps == 0 { batch.lane_count } else { 0 };
+                let done = u64::from(begun) + u64::from(counters.steps - steps_before);
+                self.pacer.record(start.elapsed(), done, steps == 0);
+            }
+            self.warm = true;
+            steps_before = counters.steps;
+            alive = counters.lanes_out;
+            if alive == 0 {
+                return Ok(());
+            }
+            steps += count as u32;
+            if steps > MOST_STEPS {
+                return Err(GpuError::Endless(steps));
+            }
+            dispatches.clear();
+        }
+    }
+
+    /// Sums the batch; after the last one of these pixels, brings their sums home.
+    fn finish_batch(
+        &mut self,
+        lanes: &Lanes,
+        batch: &Batch,
+        film: &mut Film,
+        work: &[PixelWork],
+        last: bool,
+    ) -> Result<Counters, GpuError> {
+        let mut encoder = self.encode(
+            lanes,
+            &[Dispatch {
+                kernel: ACCUMULATE,
+                parity: 0,
+                workgroups: Some(batch.pixel_count.div_ceil(64)),
+            }],
+        );
+        lanes.copy_counters(&mut encoder);
+        if !last {
+            self.submit(encoder)?;
+            let counters = lanes.read_counters(&self.gpu)?;
+            self.take_times()?;
+            return Ok(counters);
+        }
+        lanes.copy_sums(&mut encoder, work.len());
+        self.submit(encoder)?;
+        let (counters, sums, guides) = lanes.read_sums(&self.gpu, work.len())?;
+        self.take_times()?;
+        for (work, sums) in work.iter().zip(sums) {
+            film.pixels[work.pixel as usize] = sums;
+        }
+        for (work, guides) in work.iter().zip(guides) {
+            film.guides[work.pixel as usize] = guides;
+        }
+        Ok(counters)
+    }
+
+    fn encode(&mut self, lanes: &Lanes, dispatches: &[Dispatch]) -> wgpu::CommandEncoder {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let kernels = &self.kernels;
+        let groups = &self.groups;
+        let run = |pass: &mut wgpu::ComputePass<'_>, dispatch: &Dispatch| {
+            kernels[dispatch.kernel].set(pass, &groups[dispatch.kernel][dispatch.parity]);
+            match dispatch.workgroups {
+                Some(count) => pass.dispatch_workgroups(count, 1, 1),
+                None => pass.dispatch_workgroups_indirect(&lanes.indirect, 0),
+            }
+        };
+        match &mut self.profiler {
+            None => {
+                let mut pass = encoder.begin_compute_pass(&Default::default());
+                for dispatch in dispatches {
+                    run(&mut pass, dispatch);
+                }
+            }
+            Some(profiler) => {
+                for dispatch in dispatches {
+                    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                        label: Some(KERNELS[dispatch.kernel]),
+                        timestamp_writes: profiler.around(dispatch.kernel),
+                    });
+                    run(&mut pass, dispatch);
+                }
+                profiler.resolve(&mut encoder);
+            }
+        }
+        encoder
+    }
+
+    fn submit(&self, encoder: wgpu::CommandEncoder) -> Result<(), GpuError> {
+        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.check()
+    }
+
+    fn take_times(&mut self) -> Result<(), GpuError> {
+        match &mut self.profiler {
+            Some(profiler) => profiler.collect(&self.gpu),
+            None => Ok(()),
+        }
+    }
+
+    fn count_down_to_loss(&mut self) {
+        if let Some(batches) = &mut self.batches_until_loss {
+            match batches.checked_sub(1) {
+                Some(left) => *batches = left,
+                None => self.gpu.device.destroy(),
+            }
+        }
+    }
+}
+
+/// How many of the first pixels of `work` take their samples, or [`MOST_SAMPLES`] of them, in one batch of `lanes`; at least one.
+fn pixels_that_fit(work: &[PixelWork], lanes: usize) -> usize {
+    let mut longest = 1;
+    work.iter()
+        .enumerate()
+        .position(|(before, pixel)| {
+            longest = longest.max(pixel.len().min(MOST_SAMPLES) as usize);
+            (before + 1) * longest > lanes
+        })
+        .map_or(work.len(), |fitting| fitting.max(1))
+}

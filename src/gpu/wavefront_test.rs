@@ -1,0 +1,296 @@
+//! The wavefront on a toy estimator, bit for bit against the same toy in Rust.
+
+use std::sync::Arc;
+
+use bytemuck::Zeroable;
+use glam::Vec3;
+
+use super::harness::test_device;
+use super::*;
+use crate::film::{Film, Guide, Sample};
+use crate::packed::Frame;
+
+const STATE: &str = "
+const STAGE_DONE: u32 = 0u;
+const FAR: f32 = 3.40282346638528859812e38;
+struct RayCounts { primary: u32, mixed: u32, real: u32, mixed_shadow: u32, real_shadow: u32 }
+struct PathState {
+    pixel: u32, index: u32, stage: u32, word: u32,
+    radiance: vec3<f32>, mask: u32, radiance_real: vec3<f32>, depth_m: f32, normal: vec3<f32>, hit_real: u32,
+    albedo: vec3<f32>, hit_virtual: u32, rays: RayCounts,
+}";
+
+/// A walk that ends at each step with probability 1/8; what it 'hits' is a hash of where it is.
+const ESTIMATOR: &str = "
+import package::bindings::frame;
+import package::state::{PathState, STAGE_DONE};
+import package::toy::mix_bits;
+fn begin_sample(pixel: u32, index: u32, real_pass: bool) -> PathState {
+    var path: PathState;
+    path.pixel = pixel;
+    path.index = index;
+    path.stage = select(1u, 2u, real_pass);
+    path.word = mix_bits(pixel * 65537u + index + frame.seed);
+    path.depth_m = 1.0;
+    path.rays.primary = 1u;
+    if path.word % 16u == 3u { path.stage = STAGE_DONE; }
+    return path;
+}
+fn advance(path: ptr<function, PathState>) {
+    let x = f32((*path).hit_real >> 8u) / 16777216.0;
+    (*path).word = (*path).hit_real;
+    (*path).mask = (*path).hit_real & 1u;
+    (*path).radiance += vec3<f32>(x, 1.0 - x, x * 0.5);
+    (*path).normal += vec3<f32>(x);
+    if (*path).hit_real % 8u == 0u { (*path).stage = STAGE_DONE; }
+}";
+
+const REQUEST: &str = "
+import package::state::PathState;
+import package::toy::mix_bits;
+fn answer(path: ptr<function, PathState>, thread: u32) {
+    (*path).hit_real = mix_bits((*path).word ^ (*path).stage);
+    (*path).rays.mixed += 1u;
+}";
+
+const TOY: &str = "fn mix_bits(word: u32) -> u32 { var x = word; x ^= x >> 16u; x *= 0x7feb352du; return x ^ (x >> 15u); }";
+
+pub(super) fn composer() -> Composer {
+    Composer::default()
+        .with_module("state", STATE)
+        .with_module("estimator", ESTIMATOR)
+        .with_module("request", REQUEST)
+        .with_module("toy", TOY)
+}
+
+fn mix(mut x: u32) -> u32 {
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x7feb_352d);
+    x ^ (x >> 15)
+}
+
+/// Twin of the toy: the sample, and its rays.
+fn toy_sample(seed: u32, pixel: u32, index: u32, real_pass: bool) -> (Sample, u64) {
+    let stage = if real_pass { 2 } else { 1 };
+    let mut word = mix(pixel
+        .wrapping_mul(65537)
+        .wrapping_add(index)
+        .wrapping_add(seed));
+    let mut radiance = Vec3::ZERO;
+    let mut normal = Vec3::ZERO;
+    let mut mask = 0;
+    let mut rays = 0;
+    if word % 16 != 3 {
+        loop {
+            word = mix(word ^ stage);
+            let x = (word >> 8) as f32 / 16_777_216.0;
+            mask = word & 1;
+            radiance += Vec3::new(x, 1.0 - x, x * 0.5);
+            normal += Vec3::splat(x);
+            rays += 1;
+            if word.is_multiple_of(8) {
+                break;
+            }
+        }
+    }
+    let sample = Sample {
+        is_virtual: mask != 0,
+        contribution: radiance,
+        real: None,
+        guide: Some(Guide {
+            depth_m: 1.0,
+            normal,
+            albedo: Vec3::ZERO,
+        }),
+    };
+    (sample, rays)
+}
+
+/// Twin of [`GpuBackend::render`]; returns the mixed rays.
+fn toy_render(seed: u32, film: &mut Film, real_pass: bool, work: &[PixelWork]) -> u64 {
+    let mut total = 0;
+    for w in work {
+        for index in w.first..w.end {
+            let (sample, rays) = toy_sample(seed, w.pixel, index, real_pass);
+            let pixel = w.pixel as usize;
+            if real_pass {
+                film.add_real(pixel, sample.is_virtual, sample.contribution);
+            } else {
+                film.add(pixel, &sample);
+            }
+            total += rays;
+        }
+    }
+    total
+}
+
+const WIDTH: u32 = 90;
+const HEIGHT: u32 = 70;
+
+fn toy_backend(gpu: &Arc<GpuDevice>, seed: u32) -> GpuBackend {
+    let frame = Frame {
+        seed,
+        exposure_scale: 1.0,
+        ..Frame::zeroed()
+    };
+    let parts = SceneParts {
+        frame,
+        ..SceneParts::default()
+    };
+    let scene = SceneBuffers::from_parts(gpu, &parts).expect("uploads");
+    GpuBackend::with_modules(Arc::clone(gpu), &composer(), &Features::default(), scene)
+        .expect("compiles")
+}
+
+/// The next samples of every other pixel up to `end`, some pixels lagging behind.
+fn work_to(film: &Film, end: u32) -> Vec<PixelWork> {
+    (0..WIDTH * HEIGHT)
+        .filter(|pixel| pixel % 2 == 0)
+        .map(|pixel| {
+            let lag = u32::from(pixel % 14 == 0);
+            PixelWork::new(pixel, film.pixels[pixel as usize].n..end - lag)
+        })
+        .collect()
+}
+
+fn go_on(_: u64) -> bool {
+    true
+}
+
+#[test]
+fn passes_give_the_bits_of_the_twin_however_they_are_cut() {
+    let Some(gpu) = test_device() else { return };
+    let mut expected = Film::new(WIDTH, HEIGHT, 0, true);
+    let mut rays = 0;
+    for end in [9, 30] {
+        let work = work_to(&expected, end);
+        rays += toy_render(7, &mut expected, false, &work);
+    }
+
+    let mut film = Film::new(WIDTH, HEIGHT, 0, true);
+    let mut backend = toy_backend(gpu, 7);
+    let mut traced = [0; 5];
+    for end in [2, 9, 30] {
+        let work = work_to(&film, end);
+        let pass = backend
+            .render(&mut film, false, &work, &go_on)
+            .expect("renders");
+        for (sum, n) in traced.iter_mut().zip(pass) {
+            *sum += n;
+        }
+    }
+    assert_eq!(film, expected);
+    let samples: u64 = expected.pixels.iter().map(|p| u64::from(p.n)).sum();
+    assert_eq!(traced, [samples, rays, 0, 0, 0]);
+
+    // Negative control: another seed gives another film.
+    let mut other = Film::new(WIDTH, HEIGHT, 0, true);
+    let work = work_to(&other, 30);
+    toy_backend(gpu, 8)
+        .render(&mut other, false, &work, &go_on)
+        .expect("renders");
+    assert_ne!(other.pixels, expected.pixels);
+}
+
+#[test]
+fn the_real_pass_fills_its_own_sums() {
+    let Some(gpu) = test_device() else { return };
+    let start = {
+        let mut film = Film::new(WIDTH, HEIGHT, 0, false);
+        let work = work_to(&film, 5);
+        toy_render(1, &mut film, false, &work);
+        film
+    };
+    let work: Vec<PixelWork> = (0..40)
+        .map(|i| PixelWork::new(2 * i, 0..start.pixels[2 * i as usize].n))
+        .collect();
+    let mut expected = start.clone();
+    toy_render(1, &mut expected, true, &work);
+    let mut film = start;
+    toy_backend(gpu, 1)
+        .render(&mut film, true, &work, &go_on)
+        .expect("renders");
+    assert_eq!(film, expected);
+    assert!(film.pixels[0].n_real == 4 && film.pixels[2].n_real == 5);
+}
+
+/// A software device ends loops silently after 65,535 rounds of one invocation.
+#[test]
+fn one_pixel_takes_more_samples_than_a_loop_may_have_rounds() {
+    let Some(gpu) = test_device() else { return };
+    let mut expected = Film::new(WIDTH, HEIGHT, 0, false);
+    let work = [PixelWork::new(11, 0..70_000)];
+    toy_render(3, &mut expected, false, &work);
+    let mut film = Film::new(WIDTH, HEIGHT, 0, false);
+    toy_backend(gpu, 3)
+        .render(&mut film, false, &work, &go_on)
+        .expect("renders");
+    assert_eq!(film, expected);
+}
+
+#[test]
+fn after_a_loss_another_backend_goes_on_with_whole_pixels() {
+    if test_device().is_none() {
+        return;
+    }
+    let own = Arc::new(GpuDevice::open(AdapterChoice::Any).expect("opens twice"));
+    let mut film = Film::new(WIDTH, HEIGHT, 0, true);
+    let mut backend = toy_backend(&own, 5);
+    backend.lose_device_after(2);
+    // Two batches of the least size, then the loss.
+    let work = work_to(&film, 8);
+    let error = backend
+        .render(&mut film, false, &work, &go_on)
+        .expect_err("the device is lost");
+    assert!(matches!(error, GpuError::Lost(_)), "{error}");
+    let again = backend.render(&mut film, false, &work[..1], &go_on);
+    assert!(again.is_err(), "a lost device stays lost");
+
+    let done = film.pixels.iter().filter(|p| p.n > 0).count();
+    assert!(
+        done > 0 && done < work.len(),
+        "{done} pixels of {}",
+        work.len()
+    );
+    assert!(film.pixels.iter().all(|p| [0, 7, 8].contains(&p.n)));
+
+    let mut expected = Film::new(WIDTH, HEIGHT, 0, true);
+    toy_render(5, &mut expected, false, &work);
+    assert_ne!(film, expected, "control: something was missing");
+    let rest = work_to(&film, 8);
+    toy_render(5, &mut film, false, &rest);
+    assert_eq!(film, expected);
+}
+
+#[test]
+fn a_stopped_pass_leaves_whole_pixels() {
+    let Some(gpu) = test_device() else { return };
+    let mut film = Film::new(WIDTH, HEIGHT, 0, false);
+    let work = work_to(&film, 20);
+    toy_backend(gpu, 2)
+        .render(&mut film, false, &work, &|_| false)
+        .expect("stops");
+    let done = film.pixels.iter().filter(|p| p.n > 0).count();
+    assert!(done > 0 && done < work.len(), "{done}");
+    assert!(film.pixels.iter().all(|p| [0, 19, 20].contains(&p.n)));
+}
+
+#[test]
+fn kernels_are_timed_where_the_device_can() {
+    let Some(gpu) = test_device() else { return };
+    let mut backend = toy_backend(gpu, 2);
+    if !backend.profile() {
+        eprintln!("skipped: {} takes no timestamps", gpu.name());
+        return;
+    }
+    let mut film = Film::new(WIDTH, HEIGHT, 0, false);
+    let work = work_to(&film, 2);
+    backend
+        .render(&mut film, false, &work, &go_on)
+        .expect("renders");
+    let seconds = backend.kernel_seconds().expect("profiled");
+    assert!(
+        seconds.generate > 0.0 && seconds.advance > 0.0 && seconds.accumulate > 0.0,
+        "{seconds:?}"
+    );
+}

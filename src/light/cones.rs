@@ -1,0 +1,141 @@
+//! The cones in which the virtual geometry's bounding spheres are seen from a point. WGSL twin: `shaders/cones.wgsl`.
+//!
+//! A direction that meets virtual geometry lies in at least one cone, so a mixture of uniform distributions over the cones covers all of (b) in
+//! docs/estimator.md. A sphere that subtends a wide cone, or contains the point, is replaced by the cosine-weighted hemisphere.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+
+use crate::math::{cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
+use crate::packed::Frame;
+
+/// Cones with a squared sine above this are sampled as the hemisphere: uniform sampling would waste what lies below the horizon.
+const WIDE_SIN2: f32 = 0.5;
+/// Relative widening of a sphere where rounding must not let a direction that meets it be missed.
+const PADDING: f32 = 1e-5;
+
+/// One sphere seen from a point.
+struct Cone {
+    /// Unit, to the centre.
+    axis: Vec3,
+    /// Squared sine of the half-angle.
+    sin2: f32,
+    /// 1 - cos of the half-angle, without cancellation.
+    one_minus_cos: f32,
+    wide: bool,
+    /// Upper estimate of the cosine-weighted share of the hemisphere that it covers; 0 if it is wholly below the horizon.
+    weight: f32,
+}
+
+fn cone_of(frame: &Frame, i: u32, position: Vec3, ns: Vec3) -> Cone {
+    let sphere = frame.spheres[i as usize];
+    let to_centre = Vec3::new(sphere[0], sphere[1], sphere[2]) - position;
+    let distance_squared = dot3(to_centre, to_centre);
+    let radius_squared = sphere[3] * sphere[3];
+    if radius_squared >= distance_squared * WIDE_SIN2 {
+        return Cone { axis: ns, sin2: 1.0, one_minus_cos: 1.0, wide: true, weight: 1.0 };
+    }
+    let axis = to_centre / safe_sqrt(distance_squared);
+    let sin2 = radius_squared / distance_squared;
+    let cos = safe_sqrt(1.0 - sin2);
+    let one_minus_cos = sin2 / (1.0 + cos);
+    // Largest cosine against ns inside the cone: that of the angle to the axis less the half-angle.
+    let cos_axis = dot3(axis, ns).clamp(-1.0, 1.0);
+    let mut largest = 1.0;
+    if cos_axis < cos {
+        largest = cos_axis * cos + safe_sqrt(1.0 - cos_axis * cos_axis) * safe_sqrt(sin2);
+    }
+    Cone { axis, sin2, one_minus_cos, wide: false, weight: (2.0 * one_minus_cos * largest).max(0.0) }
+}
+
+/// A direction inside the cones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConeSample {
+    pub direction: Vec3,
+    /// Per solid angle, of the whole mixture; 0 if nothing virtual is above the horizon.
+    pub pdf: f32,
+}
+
+/// Draws a direction: u[0] chooses the sphere, u[1] and u[2] the direction.
+pub fn cone_sample(frame: &Frame, position: Vec3, ns: Vec3, u: [f32; 3]) -> ConeSample {
+    let mut total = 0.0;
+    for i in 0..frame.sphere_count {
+        total += cone_of(frame, i, position, ns).weight;
+    }
+    if total <= 0.0 {
+        return ConeSample { direction: ns, pdf: 0.0 };
+    }
+    let mut left = u[0] * total;
+    let mut chosen = cone_of(frame, 0, position, ns);
+    for i in 0..frame.sphere_count {
+        let cone = cone_of(frame, i, position, ns);
+        if cone.weight <= 0.0 {
+            continue;
+        }
+        left -= cone.weight;
+        chosen = cone;
+        if left < 0.0 {
+            break;
+        }
+    }
+    let mut cos = safe_sqrt(1.0 - u[1]);
+    let mut sin = safe_sqrt(u[1]);
+    if !chosen.wide {
+        let drop = u[1] * chosen.one_minus_cos;
+        cos = 1.0 - drop;
+        sin = safe_sqrt(drop * (2.0 - drop));
+    }
+    let (sin_phi, cos_phi) = sincos_2pi(u[2]);
+    let (tangent, bitangent) = orthonormal_basis(chosen.axis);
+    let direction = tangent * (sin * cos_phi) + bitangent * (sin * sin_phi) + chosen.axis * cos;
+    ConeSample { direction, pdf: cone_pdf(frame, position, ns, direction) }
+}
+
+/// Density of [`cone_sample`] in `direction` (unit).
+pub fn cone_pdf(frame: &Frame, position: Vec3, ns: Vec3, direction: Vec3) -> f32 {
+    let mut total = 0.0;
+    let mut sum = 0.0;
+    for i in 0..frame.sphere_count {
+        let cone = cone_of(frame, i, position, ns);
+        total += cone.weight;
+        if cone.wide {
+            sum += cone.weight * dot3(direction, ns).max(0.0) * (1.0 / PI);
+        } else if inside(&cone, direction) {
+            sum += cone.weight / (2.0 * PI * cone.one_minus_cos);
+        }
+    }
+    if total > 0.0 { sum / total } else { 0.0 }
+}
+
+/// By the cross product, whose relative precision holds for cones of any width.
+fn inside(cone: &Cone, direction: Vec3) -> bool {
+    let across = cross3(direction, cone.axis);
+    dot3(direction, cone.axis) > 0.0 && dot3(across, across) <= cone.sin2 * (1.0 + PADDING)
+}
+
+/// Upper estimate, in 0..1, of the cosine-weighted share of the hemisphere about `ns` that virtual geometry covers.
+pub fn cone_solid_angle_fraction(frame: &Frame, position: Vec3, ns: Vec3) -> f32 {
+    let mut total = 0.0;
+    for i in 0..frame.sphere_count {
+        total += cone_of(frame, i, position, ns).weight;
+    }
+    total.min(1.0)
+}
+
+/// False only if a ray from `position` cannot meet virtual geometry.
+pub fn direction_meets_spheres(frame: &Frame, position: Vec3, direction: Vec3) -> bool {
+    for i in 0..frame.sphere_count {
+        let sphere = frame.spheres[i as usize];
+        let to_centre = Vec3::new(sphere[0], sphere[1], sphere[2]) - position;
+        let radius_squared = sphere[3] * sphere[3] * (1.0 + PADDING);
+        if dot3(to_centre, to_centre) <= radius_squared {
+            return true;
+        }
+        let across = cross3(direction, to_centre);
+        if dot3(direction, to_centre) > 0.0 && dot3(across, across) <= radius_squared {
+            return true;
+        }
+    }
+    false
+}

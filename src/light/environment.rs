@@ -1,0 +1,202 @@
+//! The distant environment: a latitude-longitude map or a constant. WGSL twin: `shaders/environment.wgsl`.
+//!
+//! The map is bilinear between texel centres, wraps in u and is constant beyond the first and last row of centres. It is sampled by cells, the
+//! rectangles between neighbouring centres: column i lies between the centres of texels i and i + 1, row j between those of j - 1 and j. A cell
+//! is drawn with probability proportional to the mean luminance of its four corners times its solid angle (a row by the marginal, a column by
+//! the conditional distribution), the direction within it uniformly in azimuth and cosine, so its density is the mean luminance times one
+//! constant.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+
+use crate::math::{acos_, atan2_, luminance, safe_sqrt, sincos_2pi};
+use crate::packed::{Frame, PackedScene};
+
+/// Cumulative distributions for sampling a map by brightness.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EnvironmentTable {
+    /// Marginal over the height + 1 rows (height + 2 entries from 0 to 1), then for each row the conditional over its width columns
+    /// (width + 1 entries).
+    pub cdf: Vec<f32>,
+    /// 1 / integral of the cells' mean luminance over the sphere; 0 for a black map.
+    pub normaliser: f32,
+    /// Mean luminance over the sphere.
+    pub mean_luminance: f64,
+}
+
+/// Builds the table of a map of `width` x `height` texels, three floats each.
+pub fn environment_table(width: u32, height: u32, texels: &[f32]) -> EnvironmentTable {
+    let (w, h) = (width as usize, height as usize);
+    let lum = |i: usize, j: usize| {
+        let t = &texels[3 * (j * w + i)..][..3];
+        f64::from(luminance(Vec3::new(t[0], t[1], t[2])))
+    };
+    let rows = h + 1;
+    let mut row_sums = vec![0.0_f64; rows];
+    let mut conditionals = vec![0.0_f32; rows * (w + 1)];
+    for r in 0..rows {
+        let (top, bottom) = (r.max(1) - 1, r.min(h - 1));
+        let means: Vec<f64> =
+            (0..w).map(|i| 0.25 * (lum(i, top) + lum((i + 1) % w, top) + lum(i, bottom) + lum((i + 1) % w, bottom))).collect();
+        let cos_at = |row_edge: f64| (std::f64::consts::PI * (row_edge / h as f64).clamp(0.0, 1.0)).cos();
+        let solid_angle = (cos_at(r as f64 - 0.5) - cos_at(r as f64 + 0.5)) * std::f64::consts::TAU / w as f64;
+        let total: f64 = means.iter().sum();
+        row_sums[r] = total * solid_angle;
+        fill_cdf(&mut conditionals[r * (w + 1)..][..w + 1], &means);
+    }
+    let integral: f64 = row_sums.iter().sum();
+    let mut cdf = vec![0.0_f32; rows + 1];
+    fill_cdf(&mut cdf, &row_sums);
+    cdf.extend_from_slice(&conditionals);
+    EnvironmentTable {
+        cdf,
+        normaliser: if integral > 0.0 { (1.0 / integral) as f32 } else { 0.0 },
+        mean_luminance: integral / (4.0 * std::f64::consts::PI),
+    }
+}
+
+/// Running sums scaled to end at exactly 1; uniform where all weights are zero.
+fn fill_cdf(cdf: &mut [f32], weights: &[f64]) {
+    let total: f64 = weights.iter().sum();
+    let mut sum = 0.0;
+    for (i, weight) in weights.iter().enumerate() {
+        sum += weight;
+        cdf[i + 1] = if total > 0.0 { (sum / total) as f32 } else { (i + 1) as f32 / weights.len() as f32 };
+    }
+    cdf[weights.len()] = 1.0;
+}
+
+/// A direction drawn from the environment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnvSample {
+    pub direction: Vec3,
+    pub radiance: Vec3,
+    /// Per solid angle; 0 if nothing could be drawn.
+    pub pdf: f32,
+}
+
+/// World direction to map coordinates in 0..1: u to the right from the left edge, v from the zenith down.
+fn env_coordinates(frame: &Frame, direction: Vec3) -> (f32, f32) {
+    let x = direction.x * frame.env_cos - direction.z * frame.env_sin;
+    let z = direction.x * frame.env_sin + direction.z * frame.env_cos;
+    let u = 0.5 + atan2_(x, -z) * (0.5 / PI);
+    let v = acos_(direction.y.clamp(-1.0, 1.0)) * (1.0 / PI);
+    (u - u.floor(), v)
+}
+
+fn env_texel(scene: &PackedScene, i: u32, j: u32) -> Vec3 {
+    let at = 3 * (j * scene.frame.env_width + i) as usize;
+    Vec3::new(scene.env_texels[at], scene.env_texels[at + 1], scene.env_texels[at + 2])
+}
+
+/// The four texels around a point of the map and where it lies between them.
+struct Neighbours {
+    c00: Vec3,
+    c10: Vec3,
+    c01: Vec3,
+    c11: Vec3,
+    fx: f32,
+    fy: f32,
+}
+
+fn env_neighbours(scene: &PackedScene, u: f32, v: f32) -> Neighbours {
+    let width = scene.frame.env_width;
+    let height = scene.frame.env_height;
+    let s = u * width as f32 - 0.5;
+    let t = v * height as f32 - 0.5;
+    let (s0, t0) = (s.floor(), t.floor());
+    let i0 = (s0 as i32 + width as i32) as u32 % width;
+    let i1 = (i0 + 1) % width;
+    let j0 = (t0.max(0.0) as u32).min(height - 1);
+    let j1 = ((t0 + 1.0).max(0.0) as u32).min(height - 1);
+    Neighbours {
+        c00: env_texel(scene, i0, j0),
+        c10: env_texel(scene, i1, j0),
+        c01: env_texel(scene, i0, j1),
+        c11: env_texel(scene, i1, j1),
+        fx: s - s0,
+        fy: t - t0,
+    }
+}
+
+fn env_interpolate(n: &Neighbours) -> Vec3 {
+    let top = n.c00 + (n.c10 - n.c00) * n.fx;
+    let bottom = n.c01 + (n.c11 - n.c01) * n.fx;
+    top + (bottom - top) * n.fy
+}
+
+fn env_scale(frame: &Frame) -> Vec3 {
+    Vec3::new(frame.env_radiance[0], frame.env_radiance[1], frame.env_radiance[2])
+}
+
+/// Radiance that arrives from `direction` (unit, pointing away from the scene point).
+pub fn env_radiance(scene: &PackedScene, direction: Vec3) -> Vec3 {
+    if scene.frame.env_width == 0 {
+        return env_scale(&scene.frame);
+    }
+    let (u, v) = env_coordinates(&scene.frame, direction);
+    env_interpolate(&env_neighbours(scene, u, v)) * env_scale(&scene.frame)
+}
+
+/// Density per solid angle with which [`env_sample`] draws `direction`.
+pub fn env_direction_pdf(scene: &PackedScene, direction: Vec3) -> f32 {
+    if scene.frame.env_width == 0 {
+        return 0.25 / PI;
+    }
+    let (u, v) = env_coordinates(&scene.frame, direction);
+    let n = env_neighbours(scene, u, v);
+    env_cell_luminance(&n) * scene.frame.env_radiance[3]
+}
+
+fn env_cell_luminance(n: &Neighbours) -> f32 {
+    0.25 * (luminance(n.c00) + luminance(n.c10) + luminance(n.c01) + luminance(n.c11))
+}
+
+/// Last index i with cdf[base + i] <= u among `count` intervals.
+fn find_interval(cdf: &[f32], base: u32, count: u32, u: f32) -> u32 {
+    let (mut low, mut high) = (0, count);
+    while high - low > 1 {
+        let middle = (low + high) / 2;
+        if cdf[(base + middle) as usize] <= u {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+/// Draws a direction by brightness; uniformly over the sphere if the environment is constant.
+pub fn env_sample(scene: &PackedScene, u0: f32, u1: f32) -> EnvSample {
+    let frame = &scene.frame;
+    if frame.env_width == 0 {
+        let y = 1.0 - 2.0 * u0;
+        let r = safe_sqrt(1.0 - y * y);
+        let (sin, cos) = sincos_2pi(u1);
+        return EnvSample { direction: Vec3::new(r * cos, y, r * sin), radiance: env_scale(frame), pdf: 0.25 / PI };
+    }
+    let rows = frame.env_height + 1;
+    let row = find_interval(&scene.env_cdf, 0, rows, u0);
+    let base = rows + 1 + row * (frame.env_width + 1);
+    let column = find_interval(&scene.env_cdf, base, frame.env_width, u1);
+    let within = |at: u32, u: f32| {
+        let (low, high) = (scene.env_cdf[at as usize], scene.env_cdf[at as usize + 1]);
+        ((u - low) / (high - low).max(1e-20)).clamp(0.0, 1.0)
+    };
+    let fy = within(row, u0);
+    let fx = within(base + column, u1);
+    let height = frame.env_height as f32;
+    let (_, cos_top) = sincos_2pi((0.5 * (row as f32 - 0.5) / height).max(0.0));
+    let (_, cos_bottom) = sincos_2pi((0.5 * (row as f32 + 0.5) / height).min(0.5));
+    let y = cos_top + (cos_bottom - cos_top) * fy;
+    let r = safe_sqrt(1.0 - y * y);
+    let (sin, cos) = sincos_2pi((column as f32 + 0.5 + fx) / frame.env_width as f32 - 0.5);
+    // Azimuth 0 is the map's centre column: -Z, with +X to its right.
+    let (x, z) = (r * sin, -r * cos);
+    let direction = Vec3::new(x * frame.env_cos + z * frame.env_sin, y, z * frame.env_cos - x * frame.env_sin);
+    // The cell is looked up from the direction, so that this density and env_direction_pdf's are the same number.
+    let (u, v) = env_coordinates(frame, direction);
+    let n = env_neighbours(scene, u, v);
+    EnvSample { direction, radiance: env_interpolate(&n) * env_scale(frame), pdf: env_cell_luminance(&n) * frame.env_radiance[3] }
+}

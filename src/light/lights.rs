@@ -1,0 +1,141 @@
+//! Choosing a light and a point on it. WGSL twin: `shaders/lights.wgsl`.
+
+use glam::Vec3;
+
+use super::environment::{env_direction_pdf, env_sample};
+use crate::math::{dot3, length3, safe_sqrt};
+use crate::packed::{LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE, PackedScene};
+
+/// Light from one direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightSample {
+    /// Unit, from the shaded point to the light.
+    pub direction: Vec3,
+    /// Metres; infinity for the environment and directional lights.
+    pub distance: f32,
+    /// Radiance, or for delta lights what multiplies f cos: intensity over distance squared, or irradiance.
+    pub radiance: Vec3,
+    /// Per solid angle, the probability of the light's choice included; for delta lights that probability alone. 0: nothing drawn.
+    pub pdf: f32,
+    pub delta: bool,
+    /// 0 real, 1 virtual.
+    pub side: u32,
+}
+
+fn no_light() -> LightSample {
+    LightSample { direction: Vec3::Z, distance: 0.0, radiance: Vec3::ZERO, pdf: 0.0, delta: false, side: 0 }
+}
+
+fn xyz(v: [f32; 4]) -> Vec3 {
+    Vec3::new(v[0], v[1], v[2])
+}
+
+/// Alias method over all lights.
+pub fn light_select(scene: &PackedScene, u: f32) -> u32 {
+    let scaled = u * scene.frame.light_count as f32;
+    let index = (scaled as u32).min(scene.frame.light_count - 1);
+    let light = &scene.lights[index as usize];
+    if scaled - index as f32 <= light.alias_threshold { index } else { light.alias }
+}
+
+/// Draws a light with u[0] and a point on it with u[1], u[2].
+pub fn light_sample(scene: &PackedScene, position: Vec3, u: [f32; 4]) -> LightSample {
+    let light = &scene.lights[light_select(scene, u[0]) as usize];
+    match light.kind {
+        LIGHT_ENVIRONMENT => {
+            let s = env_sample(scene, u[1], u[2]);
+            LightSample {
+                direction: s.direction,
+                distance: f32::INFINITY,
+                radiance: s.radiance,
+                pdf: s.pdf * light.select_pdf,
+                delta: false,
+                side: light.side,
+            }
+        }
+        LIGHT_DIRECTIONAL => LightSample {
+            direction: -xyz(light.axis_u),
+            distance: f32::INFINITY,
+            radiance: xyz(light.radiance),
+            pdf: light.select_pdf,
+            delta: true,
+            side: light.side,
+        },
+        LIGHT_POINT | LIGHT_SPOT => sample_point_light(light, position),
+        _ => sample_area_light(light, position, u[1], u[2]),
+    }
+}
+
+fn sample_point_light(light: &Light, position: Vec3) -> LightSample {
+    let to_light = xyz(light.position) - position;
+    let distance_squared = dot3(to_light, to_light);
+    if distance_squared <= 0.0 {
+        return no_light();
+    }
+    let distance = safe_sqrt(distance_squared);
+    let direction = to_light / distance;
+    let mut radiance = xyz(light.radiance) / distance_squared;
+    if light.kind == LIGHT_SPOT {
+        radiance *= spot_falloff(light, -dot3(direction, xyz(light.axis_u)));
+    }
+    LightSample { direction, distance, radiance, pdf: light.select_pdf, delta: true, side: light.side }
+}
+
+/// The fall-off that KHR_lights_punctual recommends: the square of a linear ramp between the cosines.
+fn spot_falloff(light: &Light, cos: f32) -> f32 {
+    let (inner, outer) = (light.axis_u[3], light.axis_v[3]);
+    let ramp = ((cos - outer) / (inner - outer).max(1e-4)).clamp(0.0, 1.0);
+    ramp * ramp
+}
+
+/// Uniform over the area; a quad emits to the side of axis_u x axis_v only, a triangle to both.
+fn sample_area_light(light: &Light, position: Vec3, u0: f32, u1: f32) -> LightSample {
+    let (mut a, mut b) = (u0, u1);
+    if light.kind != LIGHT_QUAD {
+        let root = safe_sqrt(u0);
+        a = root * (1.0 - u1);
+        b = root * u1;
+    }
+    let point = xyz(light.position) + xyz(light.axis_u) * a + xyz(light.axis_v) * b;
+    let to_light = point - position;
+    let distance = length3(to_light);
+    if distance <= 0.0 {
+        return no_light();
+    }
+    let direction = to_light / distance;
+    let pdf = area_pdf(light, direction, distance);
+    if pdf <= 0.0 {
+        return no_light();
+    }
+    LightSample { direction, distance, radiance: xyz(light.radiance), pdf, delta: false, side: light.side }
+}
+
+/// Density per solid angle, choice included, of reaching an area light along `direction` at `distance`; 0 from a quad's dark side.
+fn area_pdf(light: &Light, direction: Vec3, distance: f32) -> f32 {
+    let area = light.radiance[3];
+    let normal = xyz(light.axis_u).cross(xyz(light.axis_v));
+    let mut cos = -dot3(direction, normal) / length3(normal).max(1e-30);
+    if light.kind != LIGHT_QUAD {
+        cos = cos.abs();
+    }
+    if cos <= 0.0 {
+        return 0.0;
+    }
+    light.select_pdf * distance * distance / (area * cos)
+}
+
+/// Density with which [`light_sample`] would have drawn the point that a ray along `direction` met at `distance` on `light`.
+pub fn light_pdf_hit(scene: &PackedScene, light: u32, direction: Vec3, distance: f32) -> f32 {
+    if light == NONE {
+        return 0.0;
+    }
+    area_pdf(&scene.lights[light as usize], direction, distance)
+}
+
+/// Density with which [`light_sample`] draws the environment in `direction`.
+pub fn env_pdf(scene: &PackedScene, direction: Vec3) -> f32 {
+    if scene.frame.env_light == NONE {
+        return 0.0;
+    }
+    env_direction_pdf(scene, direction) * scene.lights[scene.frame.env_light as usize].select_pdf
+}

@@ -1,0 +1,269 @@
+//! Scene to packed scene: transforms composed in f64, the anchor subtracted in f64, then f32.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DMat4, DVec3, Vec3};
+
+use super::lights::pack_lights;
+use super::materials::{MaterialKey, MaterialTable};
+use super::{
+    FRAME_ALPHA, FRAME_ENV_DRAWN, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL,
+    PackedScene, PixelInfo, Triangle, Vertex,
+};
+use crate::accel::{AccelError, WorldBvh};
+use crate::camera::lens::frame_camera;
+use crate::light::environment::environment_table;
+use crate::scene::{Aperture, EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind, Scene, Side};
+
+/// The anchor is kept while the camera stays within this distance of it, as a share of the distance that f32 resolves to 1e-7.
+const ANCHOR_REACH_M: f64 = 1.0;
+
+#[derive(Debug, thiserror::Error)]
+pub enum PackError {
+    #[error(transparent)]
+    Accel(#[from] AccelError),
+    #[error("the scene has {0} {1}; mixray addresses at most {2}")]
+    TooMany(usize, &'static str, usize),
+}
+
+impl PackedScene {
+    /// Packs the whole scene, anchored at its camera.
+    ///
+    /// # Errors
+    /// More triangles or texels than 32-bit indices address, or an acceleration structure cannot be built.
+    pub fn build(scene: &Scene) -> Result<Self, PackError> {
+        let anchor = scene.camera.world_from_camera.w_axis.truncate();
+        let mut packed = Self {
+            frame: bytemuck::Zeroable::zeroed(),
+            anchor_m: anchor.to_array(),
+            real_bvh: WorldBvh::build(&[], 0)?,
+            virtual_bvh: WorldBvh::build(&[], 0)?,
+            triangles: Vec::new(),
+            vertices: Vec::new(),
+            materials: Vec::new(),
+            texture_refs: Vec::new(),
+            texels: Vec::new(),
+            lights: Vec::new(),
+            env_texels: Vec::new(),
+            env_cdf: Vec::new(),
+            photo_albedo: Vec::new(),
+            pixels: Vec::new(),
+            material_table: MaterialTable::default(),
+            real_vertex_count: 0,
+            env_mean_luminance: 0.0,
+        };
+        packed.frame.photo_albedo_median = [0.5, 0.5, 0.5, 0.0];
+        packed.set_camera(scene);
+        packed.set_settings(scene);
+        packed.set_environment(scene);
+        packed.add_world(scene, Side::Real)?;
+        packed.real_bvh = WorldBvh::build(&packed.corners(0), 0)?;
+        packed.frame.real_triangle_count = packed.triangles.len() as u32;
+        packed.real_vertex_count = packed.vertices.len();
+        packed.rebuild_virtual(scene)?;
+        Ok(packed)
+    }
+
+    /// Packs the virtual objects and all lights anew; the real world and its BVH stay.
+    ///
+    /// # Errors
+    /// As [`PackedScene::build`].
+    pub fn rebuild_virtual(&mut self, scene: &Scene) -> Result<(), PackError> {
+        let first = self.frame.real_triangle_count;
+        self.triangles.truncate(first as usize);
+        self.vertices.truncate(self.real_vertex_count);
+        self.add_world(scene, Side::Virtual)?;
+        self.virtual_bvh = WorldBvh::build(&self.corners(first as usize), first)?;
+        let spheres = self.virtual_bvh.bounding_spheres(MAX_SPHERES);
+        self.frame.sphere_count = spheres.len() as u32;
+        self.frame.spheres = [[0.0; 4]; MAX_SPHERES];
+        self.frame.spheres[..spheres.len()].copy_from_slice(&spheres);
+        self.frame.virtual_node_base = self.real_bvh.gpu_nodes().len() as u32;
+        self.frame.virtual_leaf_base = (self.real_bvh.gpu_leaves().len() / 3) as u32;
+        let alpha = self.materials.iter().any(|m| m.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0);
+        self.frame.flags = self.frame.flags & !FRAME_ALPHA | if alpha { FRAME_ALPHA } else { 0 };
+        pack_lights(self, scene);
+        Ok(())
+    }
+
+    /// Whether the camera is still near enough to the anchor to keep what is packed.
+    pub fn anchor_serves(&self, scene: &Scene) -> bool {
+        let camera = scene.camera.world_from_camera.w_axis.truncate();
+        camera.distance(DVec3::from(self.anchor_m)) <= ANCHOR_REACH_M
+    }
+
+    /// Camera and lens; nothing else depends on them but the pilot.
+    pub fn set_camera(&mut self, scene: &Scene) {
+        frame_camera(&scene.camera, &scene.lens, DVec3::from(self.anchor_m), &mut self.frame);
+        let count = scene.camera.width as usize * scene.camera.height as usize;
+        self.pixels = vec![PixelInfo { difference_probability: 1.0, flags: PIXEL_BEAM_MAY_MEET_VIRTUAL }; count];
+        debug_assert!(matches!(scene.lens.aperture, Aperture::Disc | Aperture::Square | Aperture::Blades(_)));
+    }
+
+    /// Seed, sampler, estimator, bounces, exposure.
+    pub fn set_settings(&mut self, scene: &Scene) {
+        let settings = &scene.settings;
+        let frame = &mut self.frame;
+        frame.seed = settings.seed;
+        frame.rays_total = settings.rays_per_pixel;
+        frame.max_bounces = settings.max_bounces;
+        frame.sampler = match settings.sampler {
+            SamplerKind::Jittered => 0,
+            SamplerKind::Cmj => 1,
+            SamplerKind::Sobol => 2,
+        };
+        frame.estimator = match settings.estimator {
+            Estimator::Direct => 0,
+            Estimator::Paper => 1,
+        };
+        frame.exposure_scale = match settings.exposure {
+            Exposure::Ev(ev) => ev.exp2() as f32,
+            Exposure::Auto => 1.0,
+        };
+        if scene.photo.is_some() {
+            frame.flags |= FRAME_ENV_DRAWN;
+        }
+    }
+
+    fn set_environment(&mut self, scene: &Scene) {
+        let Some(environment) = &scene.environment else {
+            set_rotation(&mut self.frame, 0.0);
+            return;
+        };
+        set_rotation(&mut self.frame, environment.rotation_deg);
+        let scale = environment.scale as f32;
+        match &environment.map {
+            EnvironmentMap::Constant(radiance) => {
+                let [r, g, b] = radiance.map(|c| c * scale);
+                self.frame.env_radiance = [r, g, b, 0.0];
+                self.env_mean_luminance = f64::from(crate::math::luminance(Vec3::new(r, g, b)));
+            }
+            EnvironmentMap::LatLong { width, height, texels } => {
+                self.env_texels = texels.iter().flatten().copied().collect();
+                let table = environment_table(*width, *height, &self.env_texels);
+                self.frame.env_width = *width;
+                self.frame.env_height = *height;
+                self.frame.env_radiance = [scale, scale, scale, table.normaliser];
+                self.env_mean_luminance = table.mean_luminance * environment.scale;
+                self.env_cdf = table.cdf;
+            }
+        }
+    }
+
+    /// Appends the triangles of one side: its objects, then its quad lights.
+    fn add_world(&mut self, scene: &Scene, side: Side) -> Result<(), PackError> {
+        for (index, object) in scene.objects.iter().enumerate().filter(|(_, o)| o.side == side) {
+            for instance in &object.instances {
+                let material = self.add_material(&instance.material, object.self_shadow_bias_m, object.albedo_from_photo)?;
+                self.add_instance(&object.world_from_object, instance, material, index as u32);
+            }
+        }
+        for light in scene.lights.iter().filter(|l| l.side == side) {
+            if let LightKind::Quad { corner, edge_u, edge_v, radiance } = light.kind {
+                let material = self.materials.len() as u32;
+                self.materials.push(MaterialTable::quad_light(radiance));
+                self.add_quad(DVec3::from(corner), DVec3::from(edge_u), DVec3::from(edge_v), material);
+            }
+        }
+        let limit = (NONE / 8) as usize;
+        if self.triangles.len() > limit {
+            return Err(PackError::TooMany(self.triangles.len(), "triangles", limit));
+        }
+        Ok(())
+    }
+
+    fn add_material(&mut self, material: &Arc<Material>, self_shadow_bias_m: f32, from_photo: bool) -> Result<u32, PackError> {
+        let key = MaterialKey::new(material, self_shadow_bias_m, from_photo);
+        let mut table = std::mem::take(&mut self.material_table);
+        let index = table.index_of(self, material, key);
+        self.material_table = table;
+        let limit = NONE as usize;
+        if self.texels.len() > limit {
+            return Err(PackError::TooMany(self.texels.len(), "texels", limit));
+        }
+        Ok(index)
+    }
+
+    fn add_instance(&mut self, world_from_object: &DMat4, instance: &Instance, material: u32, object: u32) {
+        let world_from_local = *world_from_object * instance.object_from_local;
+        let linear = DMat3::from_mat4(world_from_local);
+        let mirrored = linear.determinant() < 0.0;
+        let normal_from_local = normal_matrix(&linear);
+        let primitive = &instance.primitive;
+        let anchor = DVec3::from(self.anchor_m);
+        let first_vertex = self.vertices.len() as u32;
+        let direction = |m: &DMat3, v: [f32; 3]| (*m * Vec3::from(v).as_dvec3()).normalize_or_zero().as_vec3();
+        for (i, position) in primitive.positions.iter().enumerate() {
+            let at = world_from_local.transform_point3(Vec3::from(*position).as_dvec3()) - anchor;
+            let at = at.as_vec3();
+            let normal = direction(&normal_from_local, primitive.normals[i]);
+            let uv = |set: usize| primitive.uvs[set].get(i).copied().unwrap_or([0.0; 2]);
+            let (uv0, uv1) = (uv(0), uv(1));
+            let tangent = primitive.tangents.get(i).map_or([0.0; 4], |t| {
+                let d = direction(&linear, [t[0], t[1], t[2]]);
+                [d.x, d.y, d.z, if mirrored { -t[3] } else { t[3] }]
+            });
+            self.vertices.push(Vertex {
+                position_u0: [at.x, at.y, at.z, uv0[0]],
+                normal_v0: [normal.x, normal.y, normal.z, uv0[1]],
+                tangent,
+                color: primitive.colors.get(i).copied().unwrap_or([1.0; 4]),
+                uv1: [uv1[0], uv1[1], 0.0, 0.0],
+            });
+        }
+        for &[a, b, c] in &primitive.triangles {
+            let (b, c) = if mirrored { (c, b) } else { (b, c) };
+            self.add_triangle([a, b, c].map(|i| first_vertex + i), material, object);
+        }
+    }
+
+    fn add_quad(&mut self, corner: DVec3, edge_u: DVec3, edge_v: DVec3, material: u32) {
+        let first_vertex = self.vertices.len() as u32;
+        let normal = edge_u.cross(edge_v).normalize_or_zero().as_vec3();
+        let anchor = DVec3::from(self.anchor_m);
+        for (u, v) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
+            let at = (corner + edge_u * u + edge_v * v - anchor).as_vec3();
+            self.vertices.push(Vertex {
+                position_u0: [at.x, at.y, at.z, u as f32],
+                normal_v0: [normal.x, normal.y, normal.z, v as f32],
+                tangent: [0.0; 4],
+                color: [1.0; 4],
+                uv1: [0.0; 4],
+            });
+        }
+        for corners in [[0, 1, 2], [0, 2, 3]] {
+            self.add_triangle(corners.map(|i| first_vertex + i), material, NONE);
+        }
+    }
+
+    /// Triangles that the transform or the rounding made degenerate are left out.
+    fn add_triangle(&mut self, vertices: [u32; 3], material: u32, object: u32) {
+        let [a, b, c] = vertices.map(|v| self.position(v));
+        if (b - a).as_dvec3().cross((c - a).as_dvec3()).length_squared() > 0.0 {
+            self.triangles.push(Triangle { vertices, material, light: NONE, object, pad: [0; 2] });
+        }
+    }
+
+    /// Anchor-relative position of a vertex.
+    pub fn position(&self, vertex: u32) -> Vec3 {
+        let [x, y, z, _] = self.vertices[vertex as usize].position_u0;
+        Vec3::new(x, y, z)
+    }
+
+    fn corners(&self, first_triangle: usize) -> Vec<[Vec3; 3]> {
+        self.triangles[first_triangle..].iter().map(|t| t.vertices.map(|v| self.position(v))).collect()
+    }
+}
+
+fn set_rotation(frame: &mut Frame, rotation_deg: f64) {
+    let (sin, cos) = rotation_deg.to_radians().sin_cos();
+    frame.env_cos = cos as f32;
+    frame.env_sin = sin as f32;
+}
+
+/// Cofactors instead of the inverse transpose: the same directions up to sign, and defined for flattened objects too.
+fn normal_matrix(linear: &DMat3) -> DMat3 {
+    let sign = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
+    let [a, b, c] = [linear.x_axis, linear.y_axis, linear.z_axis];
+    DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b)) * sign
+}
