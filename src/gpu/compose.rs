@@ -13,8 +13,14 @@ use crate::packed::{self, PackedScene};
 pub const MODULES: &[(&str, &str)] = &[
     ("bindings", include_str!("../../shaders/bindings.wgsl")),
     ("cones", include_str!("../../shaders/cones.wgsl")),
-    ("contribution", include_str!("../../shaders/contribution.wgsl")),
-    ("environment", include_str!("../../shaders/environment.wgsl")),
+    (
+        "contribution",
+        include_str!("../../shaders/contribution.wgsl"),
+    ),
+    (
+        "environment",
+        include_str!("../../shaders/environment.wgsl"),
+    ),
     ("estimator", include_str!("../../shaders/estimator.wgsl")),
     ("film", include_str!("../../shaders/film.wgsl")),
     ("kernels", include_str!("../../shaders/kernels.wgsl")),
