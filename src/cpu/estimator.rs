@@ -48,7 +48,8 @@ pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool
     } else {
         primary_missed_virtual(scene, &mut st);
     }
-    st.rays.primary = 1;
+    // A replayed sample's primary ray was counted when it was first taken.
+    st.rays.primary = u32::from(!real_pass);
     st
 }
 
