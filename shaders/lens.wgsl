@@ -65,7 +65,7 @@ fn camera_ray(px: f32, py: f32, lens_u: f32, lens_v: f32) -> CameraRay {
     let position = frame.camera_position.xyz;
     let right = frame.camera_right.xyz;
     let up = frame.camera_up.xyz;
-    let d = right * ideal.x - up * ideal.y - frame.camera_back.xyz;
+    let d = right * ideal.x - (up * ideal.y + frame.camera_back.xyz);
     @if(lens) {
         if frame.aperture_radius != 0.0 {
             let at = sample_lens(lens_u, lens_v);

@@ -21,8 +21,8 @@ fn sincos_2pi(x: f32) -> SinCos {
     let quarter = floor(x * 4.0 + 0.5);
     let r = x - quarter * 0.25;
     let z = r * r;
-    let p = ((-75.39356 * z + 81.592354) * z - 41.341663) * z - 1.9519177e-7;
-    let s = r * TAU + r * p;
+    let p = ((-75.39356 * z + 81.592354) * z - 41.341663) * z + TAU;
+    let s = r * p;
     let c = 1.0 + z * (((59.250042 * z - 85.44387) * z + 64.93933) * z - 19.739208);
     let quadrant = i32(quarter) & 3;
     let swap = (quadrant & 1) != 0;
@@ -40,7 +40,7 @@ fn acos_(x: f32) -> f32 {
     let z = select(a * a, (1.0 - a) * 0.5, outer);
     let y = select(a, sqrt(z), outer);
     let p = ((((0.037513852 * z + 0.014440975) * z + 0.0318069) * z + 0.044517085) * z
-        + 0.075005032) * z + 0.1666666;
+        + 0.07500503) * z + 0.1666666;
     let asin = y + y * z * p;
     let acos = asin * 2.0;
     let outer_angle = select(acos, PI - acos, x < 0.0);
@@ -85,7 +85,7 @@ fn exp_(x: f32) -> f32 {
     let n = floor(bounded * LOG2_E + 0.5);
     let r = max(bounded - n * LN_2_HI, -1.0) - n * LN_2_LO;
     let p = (((0.0013814597 * r + 0.008368729) * r + 0.04166839) * r + 0.16666521) * r + 0.49999994;
-    let e = 1.0 + (r + r * r * p);
+    let e = (p * r + 1.0) * r + 1.0;
     return e * bitcast<f32>(u32(i32(n) + 127) << 23u);
 }
 
@@ -97,7 +97,7 @@ fn log_(x: f32) -> f32 {
     let m = select(mantissa, mantissa * 0.5, upper);
     let e = select(exponent, exponent + 1.0, upper);
     let f = m - 1.0;
-    let p = (((((((0.067410477 * f - 0.11582882) * f + 0.11837326) * f - 0.12419113) * f
+    let p = (((((((0.06741048 * f - 0.11582882) * f + 0.11837326) * f - 0.12419113) * f
         + 0.14229332) * f - 0.16667485) * f + 0.20001526) * f - 0.25000012) * f + 0.33333322;
     let z = f * f;
     let log1p = f + z * (f * p - 0.5);

@@ -24,9 +24,9 @@ pub fn sincos_2pi(x: f32) -> (f32, f32) {
     let quarter = (x * 4.0 + 0.5).floor();
     let r = x - quarter * 0.25;
     let z = r * r;
-    // sin(2 pi r) / r, less the rounded 2 pi
-    let p = ((-75.393_56 * z + 81.592_354) * z - 41.341_663) * z - 1.951_917_7e-7;
-    let s = r * TAU + r * p;
+    // sin(2 pi r) / r; summed before the product, as a shader compiler would rearrange a sum of products
+    let p = ((-75.393_56 * z + 81.592_354) * z - 41.341_663) * z + TAU;
+    let s = r * p;
     // (cos(2 pi r) - 1) / r^2
     let c = 1.0 + z * (((59.250_042 * z - 85.443_87) * z + 64.939_33) * z - 19.739_208);
     let quadrant = quarter as i32 & 3;
@@ -51,7 +51,7 @@ pub fn acos_(x: f32) -> f32 {
     let y = if outer { z.sqrt() } else { a };
     // (asin(y) / y - 1) / y^2
     let p = ((((0.037_513_852 * z + 0.014_440_975) * z + 0.031_806_9) * z + 0.044_517_085) * z
-        + 0.075_005_032)
+        + 0.075_005_03)
         * z
         + 0.166_666_6;
     let asin = y + y * z * p;
@@ -111,7 +111,7 @@ pub fn exp_(x: f32) -> f32 {
     // (e^r - 1 - r) / r^2
     let p = (((0.001_381_459_7 * r + 0.008_368_729) * r + 0.041_668_39) * r + 0.166_665_21) * r
         + 0.499_999_94;
-    let e = 1.0 + (r + r * r * p);
+    let e = (p * r + 1.0) * r + 1.0;
     e * f32::from_bits(((n as i32 + 127) as u32) << 23)
 }
 
@@ -126,8 +126,7 @@ pub fn log_(x: f32) -> f32 {
     let e = if upper { exponent + 1.0 } else { exponent };
     let f = m - 1.0;
     // (ln(1 + f) - f + f^2 / 2) / f^3
-    let p = (((((((0.067_410_477 * f - 0.115_828_82) * f + 0.118_373_26) * f - 0.124_191_13)
-        * f
+    let p = (((((((0.067_410_48 * f - 0.115_828_82) * f + 0.118_373_26) * f - 0.124_191_13) * f
         + 0.142_293_32)
         * f
         - 0.166_674_85)

@@ -375,3 +375,47 @@ fn coordinates_out_of_range_are_refused() {
         assert_eq!(error, Some(AccelError::Coordinate { triangle: 1 }));
     }
 }
+
+fn covered(triangles: &[[Vec3; 3]], spheres: &[[f32; 4]]) -> bool {
+    triangles.iter().all(|triangle| {
+        // A triangle lies in a ball if its corners do; one ball must hold all three.
+        spheres.iter().any(|&[x, y, z, r]| {
+            let center = Vec3::new(x, y, z).as_dvec3();
+            let inside = |v: &Vec3| v.as_dvec3().distance(center) <= f64::from(r);
+            triangle.iter().all(inside)
+        })
+    })
+}
+
+fn moved(triangles: &[[Vec3; 3]], by: Vec3) -> Vec<[Vec3; 3]> {
+    triangles.iter().map(|t| t.map(|v| v + by)).collect()
+}
+
+#[test]
+fn spheres_cover_tightly_and_are_few() {
+    let ball = sphere(30, 60, 1.0);
+    let one = WorldBvh::build(&ball, 0).expect("builds").bounding_spheres(16);
+    assert_eq!(one.len(), 1, "{one:?}");
+    assert!(one[0][3] < 1.00001, "{one:?}");
+    assert!(covered(&ball, &one));
+    assert!(!covered(&moved(&ball, Vec3::X * 1e-3), &one));
+
+    let mut three = ball.clone();
+    three.extend(moved(&ball, Vec3::new(10.0, 0.0, 0.0)));
+    three.extend(moved(&ball, Vec3::new(0.0, 20.0, 5.0)));
+    let world = WorldBvh::build(&three, 0).expect("builds");
+    let cover = world.bounding_spheres(16);
+    assert_eq!(cover.len(), 3, "{cover:?}");
+    assert!(cover.iter().all(|s| s[3] < 1.00001), "{cover:?}");
+    for max in 0..5 {
+        let cover = world.bounding_spheres(max);
+        assert!(cover.len() <= max);
+        assert_eq!(covered(&three, &cover), max > 0);
+    }
+
+    for (seed, scale) in [(1, 1e-4), (2, 1.0), (3, 1e6)] {
+        let mesh = scaled(slivers(2000, seed), scale);
+        let cover = WorldBvh::build(&mesh, 0).expect("builds").bounding_spheres(16);
+        assert!(covered(&mesh, &cover), "{cover:?}");
+    }
+}

@@ -116,8 +116,8 @@ pub fn camera_ray(frame: &Frame, px: f32, py: f32, lens_u: f32, lens_v: f32) -> 
     let position = xyz(frame.camera_position);
     let right = xyz(frame.camera_right);
     let up = xyz(frame.camera_up);
-    // At depth 1 along the view axis; pixel y runs down.
-    let d = right * ideal[0] - up * ideal[1] - xyz(frame.camera_back);
+    // At depth 1 along the view axis; pixel y runs down. Grouped: a shader compiler regroups a - b - c as it likes.
+    let d = right * ideal[0] - (up * ideal[1] + xyz(frame.camera_back));
     if frame.aperture_radius == 0.0 {
         return CameraRay {
             origin: position,

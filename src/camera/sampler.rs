@@ -161,11 +161,12 @@ fn sobol_4d(stream: u32, index: u32, set_id: u32) -> [u32; 4] {
         owen_scramble(index.reverse_bits(), hash_u32(stream ^ 0x3c6e_f372)).reverse_bits()
     };
     let sobol = sobol_reversed(point);
+    // Dimensions 2 and 3 make the poorest plane of the four (10 to 25% more error at 8 to 25 samples of a blurred edge): no pair holds both.
     [
-        owen_scramble(sobol[0], hash_u32(stream ^ 0xbb67_ae85)).reverse_bits(),
-        owen_scramble(sobol[1], hash_u32(stream ^ 0x5be0_cd19)).reverse_bits(),
-        owen_scramble(sobol[2], hash_u32(stream ^ 0xcbbb_9d5d)).reverse_bits(),
-        owen_scramble(sobol[3], hash_u32(stream ^ 0x629a_292a)).reverse_bits(),
+        owen_scramble(sobol[1], hash_u32(stream ^ 0xbb67_ae85)).reverse_bits(),
+        owen_scramble(sobol[3], hash_u32(stream ^ 0x5be0_cd19)).reverse_bits(),
+        owen_scramble(sobol[0], hash_u32(stream ^ 0xcbbb_9d5d)).reverse_bits(),
+        owen_scramble(sobol[2], hash_u32(stream ^ 0x629a_292a)).reverse_bits(),
     ]
 }
 

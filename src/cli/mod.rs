@@ -1,1 +1,81 @@
-//! The command line.
+//! The command line: one file a subcommand. Each turns what was typed into what it means, checked, before any work begins.
+//!
+//! Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 a check failed, 2 usage or input, 130 ended by
+//! Ctrl-C with the picture written.
+
+mod compare;
+mod info;
+mod interrupt;
+mod progress;
+mod render;
+mod summary;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Renders virtual objects into photographs as the same camera would have taken them.
+#[derive(Debug, Parser)]
+#[command(name = "mixray", version, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Render(render::Arguments),
+    Compare(compare::Arguments),
+    Info(info::Arguments),
+}
+
+/// How a command ended that did not fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Outcome {
+    Done,
+    CheckFailed,
+    Interrupted,
+}
+
+/// Usage or input that cannot be used: the one line that says so.
+#[derive(Debug)]
+struct Failure(String);
+
+impl<E: std::error::Error> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self(error.to_string())
+    }
+}
+
+/// Parses the process's arguments and runs the command.
+pub fn run() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Render(arguments) => arguments.check().and_then(render::run),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Info(arguments) => info::run(&arguments),
+    };
+    match result {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::CheckFailed) => ExitCode::from(1),
+        Ok(Outcome::Interrupted) => ExitCode::from(130),
+        Err(Failure(message)) => {
+            say("error", &message);
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// A message to the user, one line.
+fn say(kind: &str, message: &str) {
+    let words: Vec<&str> = message.split_whitespace().collect();
+    // Without a stderr there is nobody to tell.
+    let _ = writeln!(std::io::stderr(), "{kind}: {}", words.join(" "));
+}
+
+/// A result to stdout. A reader that has heard enough (a closed pipe) is no failure.
+fn print(text: &str) {
+    let mut stdout = std::io::stdout();
+    let _ = stdout.write_all(text.as_bytes());
+    let _ = stdout.flush();
+}

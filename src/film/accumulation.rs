@@ -14,10 +14,11 @@ pub enum PixelKind {
 }
 
 /// How many pixels are of which kind; the four add up to the picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct PixelCounts {
     pub background: u64,
     pub edge: u64,
+    #[serde(rename = "virtual")]
     pub virtual_: u64,
     pub skipped: u64,
 }

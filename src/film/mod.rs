@@ -1,15 +1,16 @@
 //! The film and what is made of it: sums over samples, the composite over the photograph, the output planes.
 
 mod accumulation;
+mod compare;
 mod composite;
+mod flip;
 mod sums;
 
 pub use accumulation::{Film, MergeError, PixelCounts, PixelKind};
+pub use compare::{Comparison, SizeMismatch, compare};
 pub use composite::{Picture, Planes, QUOTIENT_EPSILON, composite, estimated_error, planes};
+pub use flip::flip;
 pub use sums::{
     Guide, GuideSums, PixelSums, Sample, Sum3, guide_add, is_unusable, pixel_add, pixel_add_real,
     sum_add, sum3_add, two_sum,
 };
-
-/// The transfer function of the photograph, by which the composite is encoded again.
-pub use crate::scene::srgb;

@@ -359,4 +359,87 @@ mod tests {
             host!(PixelSums: diff m_im m_ir r_ir sq n m n_real non_finite first_non_finite pad);
         assert_ne!(layout("PixelSums"), swapped, "control");
     }
+
+    /// The shader sums bit for bit as this file does, whatever the compiler makes of it. Controls: a plain sum in the same
+    /// shader, and the last bit of one input.
+    #[test]
+    fn the_shader_sums_the_same_bits() {
+        use crate::gpu::{Composer, Features, harness::Probe, harness::test_device};
+        let Some(gpu) = test_device() else { return };
+        const STEPS: u32 = 300;
+        let probe = Probe {
+            features: Features::default(),
+            prelude: "import package::film::{PixelSums, pixel_add, pixel_add_real};
+                fn noise(i: u32) -> f32 {
+                    var x = (i * 0x9e3779b9u) ^ 0x85ebca6bu;
+                    x = x ^ (x >> 16u);
+                    x = x * 0x7feb352du;
+                    x = x ^ (x >> 15u);
+                    return f32(x >> 8u) / 16777216.0;
+                }",
+            // The second word of a record is the zero that no compiler may know.
+            body: "var sums = PixelSums();
+                var plain = 0.0;
+                for (var i = 0u; i < 300u; i = i + 1u) {
+                    let x = noise(input(0u) * 300u + i);
+                    let v = vec3<f32>(x, 1000.0 * x, x - 0.5);
+                    let is_virtual = x < 0.4;
+                    sums = pixel_add(sums, i, is_virtual, v, input(1u));
+                    sums = pixel_add_real(sums, i, is_virtual, v, input(1u));
+                    plain = plain + x;
+                }
+                for (var c = 0u; c < 3u; c = c + 1u) {
+                    output_f32(c, sums.m_im.hi[c]);
+                    output_f32(3u + c, sums.m_im.lo[c]);
+                    output_f32(6u + c, sums.diff.hi[c]);
+                    output_f32(9u + c, sums.diff.lo[c]);
+                    output_f32(12u + c, sums.sq.hi[c]);
+                    output_f32(15u + c, sums.sq.lo[c]);
+                    output_f32(18u + c, sums.r_ir.lo[c]);
+                }
+                output(21u, sums.n);
+                output(22u, sums.m);
+                output(23u, sums.n_real);
+                output_f32(24u, plain);",
+            input_words: 2,
+            output_words: 25,
+            scene: None,
+        };
+        let inputs: Vec<u32> = (0..64).flat_map(|record| [record, 0]).collect();
+        let film = include_str!("../../shaders/film.wgsl");
+        let outputs = probe
+            .run_with(gpu, Composer::default().with_module("film", film), &inputs)
+            .expect("the probe runs");
+        let host = |record: u32, nudge: u32| -> Vec<u32> {
+            let mut sums = PixelSums::default();
+            for i in 0..STEPS {
+                let x =
+                    f32::from_bits(noise(record * STEPS + i).to_bits() + nudge * u32::from(i == 7));
+                let v = Vec3::new(x, 1000.0 * x, x - 0.5);
+                pixel_add(&mut sums, i, x < 0.4, v);
+                pixel_add_real(&mut sums, i, x < 0.4, v);
+            }
+            let floats = [
+                sums.m_im.hi,
+                sums.m_im.lo,
+                sums.diff.hi,
+                sums.diff.lo,
+                sums.sq.hi,
+                sums.sq.lo,
+                sums.r_ir.lo,
+            ];
+            let words = floats.as_flattened().iter().map(|x| x.to_bits());
+            words.chain([sums.n, sums.m, sums.n_real]).collect()
+        };
+        for (record, got) in outputs.as_chunks::<25>().0.iter().enumerate() {
+            let record = record as u32;
+            assert_eq!(got[..24], host(record, 0), "record {record}");
+            assert_ne!(got[..24], host(record, 1), "control");
+        }
+        let differ = outputs.as_chunks::<25>().0.iter().filter(|got| {
+            let sum = f64::from(f32::from_bits(got[0])) + f64::from(f32::from_bits(got[6]));
+            f64::from(f32::from_bits(got[24])) != f64::from(sum as f32)
+        });
+        assert!(differ.count() > 16, "control: a plain sum drifts");
+    }
 }

@@ -12,15 +12,15 @@ use crate::packed::{self, PackedScene};
 /// The embedded modules: name and source.
 pub const MODULES: &[(&str, &str)] = &[
     ("bindings", include_str!("../../shaders/bindings.wgsl")),
-    (
-        "contribution",
-        include_str!("../../shaders/contribution.wgsl"),
-    ),
+    ("cones", include_str!("../../shaders/cones.wgsl")),
+    ("contribution", include_str!("../../shaders/contribution.wgsl")),
+    ("environment", include_str!("../../shaders/environment.wgsl")),
     ("estimator", include_str!("../../shaders/estimator.wgsl")),
     ("film", include_str!("../../shaders/film.wgsl")),
     ("kernels", include_str!("../../shaders/kernels.wgsl")),
     ("lanes", include_str!("../../shaders/lanes.wgsl")),
     ("lens", include_str!("../../shaders/lens.wgsl")),
+    ("lights", include_str!("../../shaders/lights.wgsl")),
     ("math", include_str!("../../shaders/math.wgsl")),
     ("request", include_str!("../../shaders/request.wgsl")),
     ("sampler", include_str!("../../shaders/sampler.wgsl")),

@@ -36,6 +36,8 @@ const COAT_F0: f32 = 0.04;
 /// A mirrored or refracted direction that rounding put on the wrong side of the surface is lifted to this height.
 const GRAZING_LIFT: f32 = 1e-4;
 
+/// Albedos up to this count as none: their reciprocal would overflow.
+const NO_ALBEDO: f32 = 1e-30;
 const LARGEST_BELOW_1: f32 = 0.999_999_94;
 const INV_PI: f32 = std::f32::consts::FRAC_1_PI;
 
@@ -98,6 +100,8 @@ struct Lobes {
     coat: f32,
     /// The interface as it is at the shading normal.
     interface: Interface,
+    /// What selection takes for the albedo of the interface.
+    interface_albedo: f32,
     /// Sum of the approximate albedos.
     sum: f32,
     p_diffuse: f32,
@@ -176,7 +180,7 @@ fn interface_at(s: &Surface, cos: f32) -> Interface {
         transmitted = s.base_color * (share * (1.0 - max3(f)));
     }
     let total = max3(reflected) + max3(transmitted);
-    let inv = if total > 0.0 { 1.0 / total } else { 0.0 };
+    let inv = if total > NO_ALBEDO { 1.0 / total } else { 0.0 };
     Interface {
         reflected,
         transmitted,
@@ -184,6 +188,12 @@ fn interface_at(s: &Surface, cos: f32) -> Interface {
         transmit_probability: max3(transmitted) * inv,
         total,
     }
+}
+
+/// What the interface reflects at grazing incidence.
+fn grazing_albedo(s: &Surface) -> f32 {
+    let dielectric = 1.0 - s.metallic;
+    s.metallic + dielectric * (s.specular * (1.0 - s.transmission) + s.transmission)
 }
 
 /// Albedo of the diffuse lobe but for the interface above it.
@@ -212,12 +222,19 @@ fn lobes_at(s: &Surface, wo: Vec3) -> Lobes {
     let interface = interface_at(s, cos);
     let under = 1.0 - coat;
     let diffuse = under * max3(diffuse_albedo(s, cos));
-    let specular = under * interface.total;
+    // Facets seen at grazing angles reflect far more than the normal's: with this floor they stay bounded in weight.
+    let interface_albedo = if reflects_delta(s) {
+        interface.total
+    } else {
+        interface.total + (0.01 + 0.05 * s.ggx_alpha) * grazing_albedo(s)
+    };
+    let specular = under * interface_albedo;
     let sum = coat + diffuse + specular;
-    let inv = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+    let inv = if sum > NO_ALBEDO { 1.0 / sum } else { 0.0 };
     Lobes {
         coat,
         interface,
+        interface_albedo,
         sum,
         p_diffuse: diffuse * inv,
         p_interface: specular * inv,
@@ -372,40 +389,53 @@ pub fn bsdf_sample(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
     if scatters_nothing(s) {
         return SAMPLE_NOTHING;
     }
-    if bsdf_is_lambertian(s) {
-        let wi = sample_lambert(s, u[1], u[2]);
-        let pdf = lambert_cos(s, wi) * INV_PI;
-        if !(pdf > 0.0) {
-            return SAMPLE_NOTHING;
-        }
-        return BsdfSample {
-            wi,
-            weight: s.base_color,
-            pdf,
-            delta: false,
-            transmitted: false,
-            valid: true,
-        };
+    if !bsdf_is_lambertian(s) {
+        return sample_layers(s, wo, u);
     }
+    let wi = sample_lambert(s, u[1], u[2]);
+    let pdf = lambert_cos(s, wi) * INV_PI;
+    if !(pdf > 0.0) {
+        return SAMPLE_NOTHING;
+    }
+    BsdfSample {
+        wi,
+        weight: s.base_color,
+        pdf,
+        delta: false,
+        transmitted: false,
+        valid: true,
+    }
+}
+
+fn sample_layers(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
     let lobes = lobes_at(s, wo);
-    if !(lobes.sum > 0.0) {
+    if !(lobes.sum > NO_ALBEDO) {
         return SAMPLE_NOTHING;
     }
     if u[0] < lobes.p_diffuse {
         return mixture_sample(s, &lobes, wo, sample_lambert(s, u[1], u[2]));
     }
     let rest = u[0] - lobes.p_diffuse;
-    if rest < lobes.p_interface || lobes.p_coat == 0.0 {
-        let choice = (rest / lobes.p_interface.max(1e-20)).min(LARGEST_BELOW_1);
-        return sample_interface(s, &lobes, wo, choice, u);
+    if !(rest < lobes.p_interface || lobes.p_coat == 0.0) {
+        return sample_coat(s, &lobes, wo, u);
     }
+    let choice = (rest / lobes.p_interface.max(1e-20)).min(LARGEST_BELOW_1);
+    sample_interface(s, &lobes, wo, choice, u)
+}
+
+fn sample_coat(s: &Surface, lobes: &Lobes, wo: Vec3, u: [f32; 3]) -> BsdfSample {
     if coat_delta(s) {
         let wi = on_side(s.ng, 1.0, reflected_about(s.coat_ns, wo));
         // coat / p_coat
         return delta_sample(wi, Vec3::splat(lobes.sum), false);
     }
     let h = ggx_sample_half(s.coat_alpha, s.coat_ns, wo, u[1], u[2]);
-    mixture_sample(s, &lobes, wo, unit(reflected_about(h, wo)))
+    let mirror = unit(reflected_about(h, wo));
+    if s.coat_ns.dot(mirror) > 0.0 && s.ng.dot(mirror) > 0.0 {
+        mixture_sample(s, lobes, wo, mirror)
+    } else {
+        SAMPLE_NOTHING
+    }
 }
 
 /// `choice` in 0..1 decides between reflection and refraction.
@@ -415,11 +445,13 @@ fn sample_interface(s: &Surface, lobes: &Lobes, wo: Vec3, choice: f32, u: [f32; 
         let reflect = choice < smooth.reflect_probability;
         if !reflect {
             // transmitted / (p_interface transmit_probability), in a form that is exactly the tint where nothing else is.
-            let tint = smooth.transmitted / max3(smooth.transmitted).max(1e-30);
-            return delta_sample(transmit_straight(s, wo), tint * lobes.sum, true);
+            let tint = smooth.transmitted / max3(smooth.transmitted).max(NO_ALBEDO);
+            let scale = smooth.total / lobes.interface_albedo * lobes.sum;
+            return delta_sample(transmit_straight(s, wo), tint * scale, true);
         }
         if reflects_delta(s) {
-            let tint = smooth.reflected / max3(smooth.reflected).max(1e-30);
+            // For a smooth interface total and interface_albedo are one.
+            let tint = smooth.reflected / max3(smooth.reflected).max(NO_ALBEDO);
             let wi = on_side(s.ng, 1.0, reflected_about(s.ns, wo));
             return delta_sample(wi, tint * lobes.sum, false);
         }
@@ -431,8 +463,8 @@ fn sample_interface(s: &Surface, lobes: &Lobes, wo: Vec3, choice: f32, u: [f32; 
     }
     let mirror = unit(reflected_about(h, wo));
     if transmits_delta(s) || choice < interface_at(s, cos_half).reflect_probability {
-        // A reflection under the surface is no transmission: it is lost.
-        return if s.ng.dot(mirror) > 0.0 {
+        // Lost under either plane, where the lobe's own density is 0: neither a transmission nor a sample of another lobe.
+        return if s.ns.dot(mirror) > 0.0 && s.ng.dot(mirror) > 0.0 {
             mixture_sample(s, lobes, wo, mirror)
         } else {
             SAMPLE_NOTHING
@@ -445,7 +477,7 @@ fn sample_interface(s: &Surface, lobes: &Lobes, wo: Vec3, choice: f32, u: [f32; 
         let fresnel = fresnel_dielectric(cos_half, index);
         unit(refract_about(wo, h, cos_half, index, fresnel.g))
     };
-    if s.ng.dot(through) < 0.0 {
+    if s.ns.dot(through) < 0.0 && s.ng.dot(through) < 0.0 {
         mixture_sample(s, lobes, wo, through)
     } else {
         SAMPLE_NOTHING

@@ -10,7 +10,7 @@ use crate::packed::{
 };
 
 use super::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
-use super::texture::{slot, slot_rgb};
+use super::texture::{slot, slot_rgb, texture_sample};
 
 /// (7 u) / (1 - 7 u) with u = 2^-24: the bound on the relative error of a chain of seven roundings (Higham 2002, section 3.1).
 const GAMMA_7: f32 = 4.172_327e-7;
@@ -158,6 +158,41 @@ fn photo_albedo_at(scene: &PackedScene, position: Vec3) -> Vec3 {
     }
 }
 
+/// `normal` as the normal map of slot `map` perturbs it; unchanged without a map.
+fn perturbed(
+    scene: &PackedScene,
+    map: u32,
+    scale: f32,
+    normal: Vec3,
+    [v0, v1, v2]: [&Vertex; 3],
+    b: Vec3,
+) -> Vec3 {
+    let Some(texture) = scene.texture_refs.get(map as usize) else {
+        return normal;
+    };
+    let second = texture.flags & TEXTURE_UV1 != 0;
+    let uv = |v: &Vertex| {
+        if second { vertex_uv1(v) } else { vertex_uv0(v) }
+    };
+    let (c0, c1, c2) = (uv(v0), uv(v1), uv(v2));
+    let tangent = if v0.tangent[3] != 0.0 {
+        let blended = blend4(
+            b,
+            Vec4::from(v0.tangent),
+            Vec4::from(v1.tangent),
+            Vec4::from(v2.tangent),
+        );
+        blended.truncate().extend(v0.tangent[3])
+    } else {
+        let p0 = vertex_position(v0);
+        let e1 = vertex_position(v1) - p0;
+        let e2 = vertex_position(v2) - p0;
+        tangent_from_uv(e1, e2, c1 - c0, c2 - c0, normal)
+    };
+    let sample = texture_sample(&scene.texels, texture, blend2(b, c0, c1, c2));
+    mapped_normal(normal, tangent, sample.truncate(), scale)
+}
+
 /// The shading point of a hit (not a miss) by a ray of unit direction `ray_direction`.
 pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface {
     let triangle = &scene.triangles[hit.triangle as usize];
@@ -226,32 +261,22 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
         transmission *= slot(scene, material.transmission_texture, uv0, uv1).x;
         clearcoat *= slot(scene, material.clearcoat_texture, uv0, uv1).x;
         coat_roughness *= slot(scene, material.clearcoat_roughness_texture, uv0, uv1).y;
-        let maps = [material.normal_texture, material.clearcoat_normal_texture];
-        if maps != [NONE, NONE] {
-            let tangent = blend4(
-                b,
-                Vec4::from(v0.tangent),
-                Vec4::from(v1.tangent),
-                Vec4::from(v2.tangent),
-            );
-            let corner_uvs0 = [vertex_uv0(v0), vertex_uv0(v1), vertex_uv0(v2)];
-            let corner_uvs1 = [vertex_uv1(v0), vertex_uv1(v1), vertex_uv1(v2)];
-            let perturbed = |map: u32, scale: f32| {
-                if map == NONE {
-                    return smooth;
-                }
-                let second = scene.texture_refs[map as usize].flags & TEXTURE_UV1 != 0;
-                let [c0, c1, c2] = if second { corner_uvs1 } else { corner_uvs0 };
-                let frame = if v0.tangent[3] != 0.0 {
-                    tangent.truncate().extend(v0.tangent[3])
-                } else {
-                    tangent_from_uv(e1, e2, c1 - c0, c2 - c0, smooth)
-                };
-                mapped_normal(smooth, frame, slot_rgb(scene, map, uv0, uv1), scale)
-            };
-            ns = perturbed(maps[0], material.normal_scale);
-            coat_ns = perturbed(maps[1], material.clearcoat_normal_scale);
-        }
+        ns = perturbed(
+            scene,
+            material.normal_texture,
+            material.normal_scale,
+            smooth,
+            [v0, v1, v2],
+            b,
+        );
+        coat_ns = perturbed(
+            scene,
+            material.clearcoat_normal_texture,
+            material.clearcoat_normal_scale,
+            smooth,
+            [v0, v1, v2],
+            b,
+        );
     }
     let mut base_color = base.truncate().clamp(Vec3::ZERO, Vec3::ONE);
     let coverage = coverage_of(material, base.w);

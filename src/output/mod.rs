@@ -6,6 +6,7 @@ mod target;
 
 pub use exr_file::{Metadata, write_exr};
 pub use png_file::{PngBits, write_png};
+pub(crate) use target::check_writable;
 pub use target::{Format, Target, write_text};
 
 use std::path::PathBuf;

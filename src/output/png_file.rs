@@ -6,7 +6,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use super::target::write_atomically;
 use super::{OutputError, Target};
 use crate::film::Picture;
-use crate::film::srgb::{encode8, encode16};
+use crate::scene::srgb::{encode8, encode16};
 use crate::scene::{EncodedPhoto, Photo};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,7 +85,7 @@ fn codes<T: Copy>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::srgb::{decode8, decode16};
+    use crate::scene::srgb::{decode8, decode16};
 
     fn picture(linear: Vec<[f32; 3]>) -> Picture {
         Picture {

@@ -19,10 +19,12 @@
 
 mod control;
 mod photo_albedo;
+mod stats;
 
 use std::time::Instant;
 
 pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
+pub use stats::Stats;
 
 use crate::cpu;
 use crate::film::{Film, Picture, Planes, composite, planes};

@@ -1,5 +1,7 @@
 //! `[photo]`: the camera image and the exposure that ties the scene to it.
 
+use std::path::Path;
+
 use super::error::Result;
 use super::image_file::{Pixels, read_image};
 use super::reader::{Node, Table};
@@ -40,23 +42,35 @@ fn read_exposure(node: &Node, has_photo: bool) -> Result<Exposure> {
 
 fn read_photo_image(node: &Node, warnings: &mut Vec<String>) -> Result<Photo> {
     let path = node.existing_file()?;
-    let image = read_image(&path).map_err(|problem| node.file_error(&path, &problem))?;
-    warnings.extend(node.file_warnings(image.warnings));
-    let (linear, encoded) = match image.pixels {
-        Pixels::Srgb8(codes) => (
-            codes.iter().map(|code| code.map(decode8)).collect(),
-            EncodedPhoto::Srgb8(codes),
-        ),
-        Pixels::Srgb16(codes) => (
-            codes.iter().map(|code| code.map(decode16)).collect(),
-            EncodedPhoto::Srgb16(codes),
-        ),
-        Pixels::Linear(linear) => (linear, EncodedPhoto::Linear),
-    };
-    Ok(Photo {
-        width: image.width,
-        height: image.height,
-        linear,
-        encoded,
-    })
+    let (photo, notes) = Photo::read(&path).map_err(|problem| node.file_error(&path, &problem))?;
+    warnings.extend(node.file_warnings(notes));
+    Ok(photo)
+}
+
+impl Photo {
+    /// Reads and decodes an image file (PNG, JPEG, OpenEXR, Radiance HDR), with warnings of what in it is ignored.
+    ///
+    /// # Errors
+    /// Why the file cannot be used, in one line without its path.
+    pub fn read(path: &Path) -> std::result::Result<(Self, Vec<String>), String> {
+        let image = read_image(path)?;
+        let (linear, encoded) = match image.pixels {
+            Pixels::Srgb8(codes) => (
+                codes.iter().map(|code| code.map(decode8)).collect(),
+                EncodedPhoto::Srgb8(codes),
+            ),
+            Pixels::Srgb16(codes) => (
+                codes.iter().map(|code| code.map(decode16)).collect(),
+                EncodedPhoto::Srgb16(codes),
+            ),
+            Pixels::Linear(linear) => (linear, EncodedPhoto::Linear),
+        };
+        let photo = Self {
+            width: image.width,
+            height: image.height,
+            linear,
+            encoded,
+        };
+        Ok((photo, image.warnings))
+    }
 }

@@ -99,8 +99,8 @@ pub fn one_triangle(corners: [[f32; 3]; 3], material: Material) -> PackedScene {
     PackedScene {
         frame: Frame::zeroed(),
         anchor_m: [0.0; 3],
-        real_bvh: WorldBvh,
-        virtual_bvh: WorldBvh,
+        real_bvh: empty_world(),
+        virtual_bvh: empty_world(),
         triangles: vec![Triangle {
             vertices: [0, 1, 2],
             material: 0,
@@ -155,4 +155,8 @@ pub fn around(axis: Vec3, theta: f64, phi: f64) -> Vec3 {
     let b = n.cross(t);
     let d: DVec3 = t * (theta.sin() * phi.cos()) + b * (theta.sin() * phi.sin()) + n * theta.cos();
     d.as_vec3().normalize()
+}
+
+fn empty_world() -> WorldBvh {
+    WorldBvh::build(&[], 0).expect("an empty world is legal")
 }

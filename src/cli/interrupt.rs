@@ -1,0 +1,27 @@
+//! Ctrl-C: the first asks the render to end, the second ends the program at once.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::Failure;
+
+#[derive(Clone)]
+pub(super) struct Interrupted(Arc<AtomicBool>);
+
+impl Interrupted {
+    pub(super) fn is_set(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// Watches from now on. Called when rendering begins: before that there is nothing worth writing, and Ctrl-C simply ends the program.
+pub(super) fn watch() -> Result<Interrupted, Failure> {
+    let flag = Interrupted(Arc::new(AtomicBool::new(false)));
+    let seen = flag.clone();
+    ctrlc::set_handler(move || {
+        if seen.0.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })?;
+    Ok(flag)
+}

@@ -1,0 +1,41 @@
+//! The progress bar: on stderr, and only where that is a terminal.
+
+use std::io::IsTerminal;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::renderer::Progress;
+
+pub(super) struct Bar(Option<ProgressBar>);
+
+impl Bar {
+    pub(super) fn new() -> Self {
+        if !std::io::stderr().is_terminal() {
+            return Self(None);
+        }
+        let bar = ProgressBar::new(1);
+        let template = "{wide_bar} {pos}/{len} rays per pixel, {msg}{eta} left";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self(Some(bar))
+    }
+
+    pub(super) fn show(&self, progress: &Progress) {
+        if let Some(bar) = &self.0 {
+            bar.set_length(u64::from(progress.samples_total));
+            bar.set_position(u64::from(progress.samples));
+            let seconds = progress.elapsed.as_secs_f64().max(1e-9);
+            let rate = progress.rays.traced() as f64 / seconds / 1e6;
+            bar.set_message(format!("{rate:.2} Mrays/s, "));
+        }
+    }
+
+    pub(super) fn clear(&self) {
+        if let Some(bar) = &self.0 {
+            bar.finish_and_clear();
+        }
+    }
+}

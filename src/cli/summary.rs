@@ -1,0 +1,82 @@
+//! The few lines that a render ends with.
+
+use crate::film::estimated_error;
+use crate::output::Target;
+use crate::renderer::{Renderer, Stats};
+
+pub(super) fn text(renderer: &Renderer, stats: &Stats, targets: &[Target]) -> String {
+    let film = renderer.film();
+    let error = estimated_error(film, renderer.scene().photo.as_ref());
+    let mut out = String::new();
+    for target in targets {
+        out += &format!(
+            "picture {} ({} x {}, {} rays per pixel)\n",
+            target.path().display(),
+            film.width,
+            film.height,
+            renderer.samples()
+        );
+    }
+    out + &lines(stats, error)
+}
+
+fn lines(stats: &Stats, error: f64) -> String {
+    let s = &stats.seconds;
+    let r = &stats.rays;
+    let p = &stats.pixels;
+    let pixels = (p.background + p.edge + p.virtual_ + p.skipped).max(1) as f64;
+    let share = |count: u64| format!("{:.1}%", 100.0 * count as f64 / pixels);
+    let traced = r.mixed + r.real + r.mixed_shadow + r.real_shadow;
+    let rate = if s.render > 0.0 {
+        traced as f64 / s.render / 1e6
+    } else {
+        0.0
+    };
+    format!(
+        "time    {:.2} s: load {:.2}, build {:.2}, compile {:.2}, render {:.2}, write {:.2}\n\
+         rays    {} primary, {} in all: mixed {}, real {}, mixed shadow {}, real shadow {}; {rate:.2} Mrays/s on {} ({})\n\
+         pixels  {} skipped, {} background, {} edge, {} virtual\n\
+         error   {error:.2e} RMS, linear: an upper estimate, from the variance of the samples\n",
+        s.load + s.build + s.compile + s.render + s.write,
+        s.load,
+        s.build,
+        s.compile,
+        s.render,
+        s.write,
+        short(r.primary),
+        short(traced),
+        short(r.mixed),
+        short(r.real),
+        short(r.mixed_shadow),
+        short(r.real_shadow),
+        stats.device,
+        stats.backend,
+        share(p.skipped),
+        share(p.background),
+        share(p.edge),
+        share(p.virtual_),
+    )
+}
+
+/// 1234567 as "1.23 M".
+fn short(count: u64) -> String {
+    match count {
+        0..10_000 => count.to_string(),
+        10_000..10_000_000 => format!("{:.2} M", count as f64 / 1e6),
+        10_000_000..10_000_000_000 => format!("{:.1} M", count as f64 / 1e6),
+        _ => format!("{:.1} G", count as f64 / 1e9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_are_short() {
+        assert_eq!(short(9999), "9999");
+        assert_eq!(short(1_234_567), "1.23 M");
+        assert_eq!(short(123_456_789), "123.5 M");
+        assert_eq!(short(12_345_678_901), "12.3 G");
+    }
+}

@@ -1,0 +1,112 @@
+//! What a render took, for programs: the record behind `--stats`.
+
+use serde::Serialize;
+
+use super::Renderer;
+use crate::film::PixelCounts;
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stats {
+    pub seconds: StatsSeconds,
+    pub rays: StatsRays,
+    pub pixels: PixelCounts,
+    /// Samples left out because they were not finite.
+    pub non_finite_samples: u64,
+    /// "cpu" or "gpu".
+    pub backend: String,
+    /// The adapter's name, or the number of threads.
+    pub device: String,
+}
+
+/// Wall-clock seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct StatsSeconds {
+    /// Scene file and everything it names.
+    pub load: f64,
+    /// Acceleration structures and whatever else precedes the first ray.
+    pub build: f64,
+    /// Shaders.
+    pub compile: f64,
+    pub render: f64,
+    /// Composite and files.
+    pub write: f64,
+}
+
+/// Rays traced, by the paper's kinds. Primary rays are among the mixed and real ones too.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct StatsRays {
+    pub primary: u64,
+    pub mixed: u64,
+    pub real: u64,
+    pub mixed_shadow: u64,
+    pub real_shadow: u64,
+}
+
+impl Stats {
+    /// Of a render whose loading and writing took these times.
+    pub fn new(renderer: &Renderer, load_secs: f64, write_secs: f64) -> Self {
+        let seconds = renderer.seconds();
+        let rays = renderer.rays();
+        Self {
+            seconds: StatsSeconds {
+                load: load_secs,
+                build: seconds.build,
+                compile: seconds.compile,
+                render: seconds.render,
+                write: write_secs,
+            },
+            rays: StatsRays {
+                primary: rays.primary,
+                mixed: rays.mixed,
+                real: rays.real,
+                mixed_shadow: rays.mixed_shadow,
+                real_shadow: rays.real_shadow,
+            },
+            pixels: renderer.film().counts(),
+            non_finite_samples: renderer.film().non_finite_samples(),
+            backend: renderer.backend_name().to_owned(),
+            device: renderer.device_name(),
+        }
+    }
+
+    pub fn to_json(&self) -> String {
+        // Strings and numbers only: this cannot fail.
+        let mut json = serde_json::to_string_pretty(self).unwrap_or_default();
+        json.push('\n');
+        json
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_has_exactly_the_documented_keys() {
+        let stats = Stats {
+            seconds: StatsSeconds::default(),
+            rays: StatsRays::default(),
+            pixels: PixelCounts::default(),
+            non_finite_samples: 0,
+            backend: "cpu".into(),
+            device: "2 CPU threads".into(),
+        };
+        let json: serde_json::Value = serde_json::from_str(&stats.to_json()).unwrap();
+        let mut keys = Vec::new();
+        for (key, value) in json.as_object().unwrap() {
+            match value.as_object() {
+                Some(inner) => keys.extend(inner.keys().map(|k| format!("{key}.{k}"))),
+                None => keys.push(key.clone()),
+            }
+        }
+        keys.sort();
+        let mut documented: Vec<&str> = "backend device non_finite_samples \
+            seconds.load seconds.build seconds.compile seconds.render seconds.write \
+            rays.primary rays.mixed rays.real rays.mixed_shadow rays.real_shadow \
+            pixels.background pixels.edge pixels.virtual pixels.skipped"
+            .split_whitespace()
+            .collect();
+        documented.sort_unstable();
+        assert_eq!(keys, documented);
+    }
+}

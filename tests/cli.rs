@@ -1,0 +1,339 @@
+//! The built program: exit codes, one-line errors, what lands on stdout and on disk.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A photograph, a proxy, and optionally something virtual over it.
+struct Folder(tempfile::TempDir);
+
+const CAMERA: &str = "[photo]\nimage = \"photo.png\"\n[camera]\nvertical_fov_deg = 45\n[environment]\nradiance = [1, 1, 1]\n";
+const VIRTUAL: &str = "[[virtual]]\nshape = \"sphere\"\nscale = 0.3\ntranslation = [0, 0, -3]\nmaterial = { base_color = [0.5, 0.4, 0.3] }\n";
+
+impl Folder {
+    fn new(scene: &str) -> Self {
+        let folder = Self(tempfile::Builder::new().prefix("demo").tempdir().unwrap());
+        let photo = image::RgbImage::from_fn(24, 16, |x, y| {
+            image::Rgb([(x * 10) as u8, (y * 15) as u8, (x * y) as u8])
+        });
+        photo.save(folder.path("photo.png")).unwrap();
+        std::fs::write(folder.path("scene.toml"), scene).unwrap();
+        folder
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn entries(&self) -> Vec<String> {
+        let mut names: Vec<String> = std::fs::read_dir(self.0.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    /// Runs mixray with this folder as the current one.
+    fn run(&self, arguments: &[&str]) -> Output {
+        command(self.0.path(), arguments).output().unwrap()
+    }
+}
+
+fn command(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mixray"));
+    command.current_dir(folder).args(arguments);
+    command
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Exit code 2 and one line that begins with "error:" and holds `part`.
+fn assert_refused(output: &Output, part: &str) {
+    let message = stderr(output);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.starts_with("error:"), "{message}");
+    assert!(message.contains(part), "{message} lacks {part}");
+    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+    assert!(output.stdout.is_empty());
+}
+
+/// Invariant 1 from the outside, and the default name of the picture.
+#[test]
+fn nothing_virtual_gives_the_photograph_back() {
+    let folder = Folder::new(CAMERA);
+    let output = folder.run(&["render", "scene.toml", "--backend", "cpu"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let name = folder.0.path().file_name().unwrap().to_string_lossy();
+    let picture = format!("{name}.png");
+    assert!(
+        stdout(&output).contains(&picture),
+        "says where the picture is"
+    );
+    let open = |name: &str| image::open(folder.path(name)).unwrap().into_rgb8();
+    assert_eq!(open(&picture), open("photo.png"));
+    let output = folder.run(&["compare", &picture, "photo.png", "--max-rmse", "0"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+}
+
+#[test]
+fn every_kind_of_output_is_written() {
+    let folder = Folder::new(&format!("{CAMERA}{VIRTUAL}"));
+    let output = folder.run(&[
+        "render",
+        "scene.toml",
+        "--rpp",
+        "4",
+        "--seed",
+        "7",
+        "--backend",
+        "cpu",
+        "--estimator",
+        "paper",
+        "--sampler",
+        "cmj",
+        "--composite",
+        "quotient",
+        "--max-bounces",
+        "2",
+        "--png-bits",
+        "16",
+        "--threads",
+        "1",
+        "--stats",
+        "s.json",
+        "-o",
+        "a.png",
+        "-o",
+        "b.exr",
+    ]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(
+        stderr(&output),
+        "",
+        "no progress bar where there is no terminal"
+    );
+    let summary = stdout(&output);
+    for part in ["a.png", "b.exr", "primary", "Mrays/s", "skipped", "error"] {
+        assert!(summary.contains(part), "{summary} lacks {part}");
+    }
+    assert!(matches!(
+        image::open(folder.path("a.png")).unwrap(),
+        image::DynamicImage::ImageRgb16(_)
+    ));
+    let exr = exr::meta::MetaData::read_from_file(folder.path("b.exr"), true).unwrap();
+    let names: Vec<String> = (exr.headers[0].channels.list.iter())
+        .map(|channel| channel.name.to_string())
+        .collect();
+    for name in [
+        "R",
+        "mixed.G",
+        "real.B",
+        "difference.R",
+        "albedo.R",
+        "variance.R",
+        "mask.Y",
+        "depth.Z",
+        "normal.X",
+        "samples.Y",
+    ] {
+        assert!(names.iter().any(|n| n == name), "{names:?} lacks {name}");
+    }
+    let stats: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path("s.json")).unwrap()).unwrap();
+    assert_eq!(stats["backend"], "cpu");
+    let pixels = &stats["pixels"];
+    let total: u64 = ["background", "edge", "virtual", "skipped"]
+        .iter()
+        .map(|k| pixels[k].as_u64().unwrap())
+        .sum();
+    assert_eq!(total, 24 * 16);
+    assert_eq!(
+        folder.entries(),
+        ["a.png", "b.exr", "photo.png", "s.json", "scene.toml"],
+        "no temporary file is left"
+    );
+}
+
+#[test]
+fn unusable_scenes_are_one_line_and_exit_code_2() {
+    let folder = Folder::new(&format!("{CAMERA}vertical_fov = 3\n"));
+    assert_refused(&folder.run(&["render", "scene.toml"]), "scene.toml:7:1");
+    assert_refused(&folder.run(&["render", "absent.toml"]), "absent.toml");
+    let folder = Folder::new(&CAMERA.replace("photo.png", "absent.png"));
+    assert_refused(&folder.run(&["render", "scene.toml"]), "absent.png");
+}
+
+/// The outputs are tried before the scene is even read: the scene here does not exist, and the message is about the output.
+#[test]
+fn unwritable_outputs_are_refused_before_any_work() {
+    let folder = Folder::new(CAMERA);
+    std::fs::create_dir(folder.path("folder.png")).unwrap();
+    for target in ["absent/a.png", "a.jpg", "folder.png"] {
+        assert_refused(
+            &folder.run(&["render", "absent.toml", "-o", target]),
+            target,
+        );
+    }
+    let output = folder.run(&[
+        "render",
+        "absent.toml",
+        "-o",
+        "a.png",
+        "--stats",
+        "absent/s.json",
+    ]);
+    assert_refused(&output, "absent/s.json");
+    assert_eq!(folder.entries(), ["folder.png", "photo.png", "scene.toml"]);
+    assert_refused(
+        &folder.run(&["render", "absent.toml", "-o", "a.png"]),
+        "absent.toml",
+    );
+}
+
+#[test]
+fn bad_usage_is_exit_code_2_and_help_is_0() {
+    let folder = Folder::new(CAMERA);
+    let bad: [&[&str]; 10] = [
+        &[],
+        &["rendre"],
+        &["render"],
+        &["render", "scene.toml", "--rpp", "0"],
+        &["render", "scene.toml", "--rpp", "-4"],
+        &["render", "scene.toml", "--sampler", "random"],
+        &["render", "scene.toml", "--png-bits", "12"],
+        &["render", "scene.toml", "--threads", "0"],
+        &["compare", "photo.png"],
+        &["compare", "photo.png", "photo.png", "--max-rmse", "NaN"],
+    ];
+    for arguments in bad {
+        let output = folder.run(arguments);
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+        assert!(!output.stderr.is_empty() && output.stdout.is_empty());
+    }
+    for arguments in [["--help"], ["--version"]] {
+        let output = folder.run(&arguments);
+        assert_eq!(output.status.code(), Some(0));
+        assert!(stdout(&output).contains("mixray"));
+    }
+    assert_eq!(folder.entries(), ["photo.png", "scene.toml"]);
+}
+
+#[test]
+fn compare_prints_json_and_checks_a_limit() {
+    let folder = Folder::new(CAMERA);
+    let grey = |code: u8| image::RgbImage::from_pixel(8, 8, image::Rgb([code; 3]));
+    grey(100).save(folder.path("a.png")).unwrap();
+    grey(110).save(folder.path("b.png")).unwrap();
+    let linear = |code: f64| ((code / 255.0 + 0.055) / 1.055).powf(2.4);
+    let difference = linear(110.0) - linear(100.0);
+    let output = folder.run(&["compare", "a.png", "b.png"]);
+    assert_eq!(output.status.code(), Some(0));
+    let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let number = |key: &str| json[key].as_f64().unwrap();
+    assert!((number("rmse") - difference).abs() < 1e-7);
+    assert!((number("psnr") + 20.0 * difference.log10()).abs() < 1e-3);
+    let relative = difference * difference / (linear(110.0).powi(2) + 0.01);
+    assert!((number("rel_mse") - relative).abs() < 1e-7);
+    assert!(number("flip") > 0.0);
+
+    let limit = |factor: f64| {
+        let limit = (difference * factor).to_string();
+        folder
+            .run(&["compare", "a.png", "b.png", "--max-rmse", &limit])
+            .status
+            .code()
+    };
+    assert_eq!((limit(0.999), limit(1.001)), (Some(1), Some(0)));
+    assert_refused(
+        &folder.run(&["compare", "a.png", "photo.png"]),
+        "8x8 and 24x16",
+    );
+    assert_refused(
+        &folder.run(&["compare", "a.png", "absent.png"]),
+        "absent.png",
+    );
+    assert_refused(
+        &folder.run(&["compare", "a.png", "scene.toml"]),
+        "scene.toml",
+    );
+}
+
+#[test]
+fn info_names_the_processor_and_every_adapter() {
+    let folder = Folder::new(CAMERA);
+    let text = folder.run(&["info"]);
+    assert_eq!(text.status.code(), Some(0));
+    assert!(stdout(&text).contains("threads"));
+    let json = folder.run(&["info", "--json"]);
+    let adapters: serde_json::Value = serde_json::from_str(&stdout(&json)).unwrap();
+    for adapter in adapters.as_array().unwrap() {
+        assert!(stdout(&text).contains(adapter["name"].as_str().unwrap()));
+    }
+}
+
+/// Ctrl-C ends a render that would take days; the picture is written and whole.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_writes_the_picture_and_exits_with_130() {
+    use std::os::unix::process::ExitStatusExt;
+    use std::time::{Duration, Instant};
+
+    let folder = Folder::new(&format!("{CAMERA}{VIRTUAL}"));
+    // A signal before the render has begun just ends the program; then there has to be more patience.
+    for wait_ms in [500, 2000, 8000] {
+        let mut child = command(
+            folder.0.path(),
+            &[
+                "render",
+                "scene.toml",
+                "--backend",
+                "cpu",
+                "--rpp",
+                "16777216",
+                "-o",
+                "a.png",
+            ],
+        )
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+        std::thread::sleep(Duration::from_millis(wait_ms));
+        assert_eq!(child.try_wait().unwrap(), None, "still rendering");
+        assert!(!folder.path("a.png").exists());
+        let kill = Command::new("kill")
+            .args(["-INT", &child.id().to_string()])
+            .status();
+        assert!(kill.unwrap().success());
+        let start = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait().unwrap() {
+                break status;
+            }
+            if start.elapsed() > Duration::from_secs(30) {
+                child.kill().unwrap();
+                panic!("did not end");
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        if status.signal().is_some() {
+            continue;
+        }
+        assert_eq!(status.code(), Some(130));
+        let picture = image::open(folder.path("a.png")).unwrap();
+        assert_eq!((picture.width(), picture.height()), (24, 16));
+        assert_eq!(folder.entries(), ["a.png", "photo.png", "scene.toml"]);
+        return;
+    }
+    panic!("the render never began");
+}
