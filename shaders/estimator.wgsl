@@ -31,7 +31,7 @@ fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
     st.position = ray.origin;
     st.direction = ray.direction;
     let may_meet_virtual = (pixels[pixel].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u;
-    st.rays.primary = 1u;
+    st.rays.primary = select(1u, 0u, is_real_pass);
     if is_real_pass {
         st.stage = STAGE_REAL_PASS;
         st.request = select(REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_EACH, may_meet_virtual);

@@ -7,29 +7,29 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::renderer::Progress;
 
+const FIRST: &str = "{wide_bar} {pos}/{len} rays per pixel";
+const RUNNING: &str = "{wide_bar} {pos}/{len} rays per pixel, {msg} Mrays/s, {eta} left";
+
 pub(super) struct Bar(Option<ProgressBar>);
 
 impl Bar {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(rays_per_pixel: u32) -> Self {
         if !std::io::stderr().is_terminal() {
             return Self(None);
         }
-        let bar = ProgressBar::new(1);
-        let template = "{wide_bar} {pos}/{len} rays per pixel, {msg}{eta} left";
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
+        let bar = ProgressBar::new(u64::from(rays_per_pixel));
+        set_template(&bar, FIRST);
         bar.enable_steady_tick(Duration::from_millis(200));
         Self(Some(bar))
     }
 
     pub(super) fn show(&self, progress: &Progress) {
         if let Some(bar) = &self.0 {
-            bar.set_length(u64::from(progress.samples_total));
+            set_template(bar, RUNNING);
             bar.set_position(u64::from(progress.samples));
             let seconds = progress.elapsed.as_secs_f64().max(1e-9);
             let rate = progress.rays.traced() as f64 / seconds / 1e6;
-            bar.set_message(format!("{rate:.2} Mrays/s, "));
+            bar.set_message(format!("{rate:.2}"));
         }
     }
 
@@ -37,5 +37,11 @@ impl Bar {
         if let Some(bar) = &self.0 {
             bar.finish_and_clear();
         }
+    }
+}
+
+fn set_template(bar: &ProgressBar, template: &str) {
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
     }
 }

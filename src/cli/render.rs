@@ -135,7 +135,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     };
     let mut renderer = Renderer::new(scene, options)?;
     let interrupted = interrupt::watch()?;
-    let bar = progress::Bar::new();
+    let bar = progress::Bar::new(renderer.scene().settings.rays_per_pixel);
     let result = renderer.advance(Budget::Complete, &|| interrupted.is_set(), &mut |p| {
         bar.show(&p);
     });

@@ -23,7 +23,13 @@ pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> [f32; 4] {
 }
 
 pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {
-    SampleKey { pixel: st.pixel, index: st.index, total: scene.frame.rays_total, seed: scene.frame.seed, sampler: scene.frame.sampler }
+    SampleKey {
+        pixel: st.pixel,
+        index: st.index,
+        total: scene.frame.rays_total,
+        seed: scene.frame.seed,
+        sampler: scene.frame.sampler,
+    }
 }
 
 /// Adds light to what the present mode accumulates into.
@@ -39,5 +45,9 @@ pub fn accumulate(scene: &PackedScene, st: &mut PathState, light: Vec3) {
 
 /// Balance heuristic of a direction drawn with `density` against the light technique's `pdf`.
 pub fn density_weight(density: f32, pdf: f32) -> f32 {
-    if density == DELTA_DENSITY { 1.0 } else { density / (density + pdf) }
+    if density == DELTA_DENSITY {
+        1.0
+    } else {
+        density / (density + pdf)
+    }
 }

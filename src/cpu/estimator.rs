@@ -33,7 +33,11 @@ pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool
     let may_meet_virtual = scene.pixels[pixel as usize].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0;
     if real_pass {
         st.stage = STAGE_REAL_PASS;
-        st.request = if may_meet_virtual { REQUEST_CLOSEST_EACH } else { REQUEST_CLOSEST_REAL };
+        st.request = if may_meet_virtual {
+            REQUEST_CLOSEST_EACH
+        } else {
+            REQUEST_CLOSEST_REAL
+        };
     } else if scene.frame.estimator == ESTIMATOR_PAPER {
         st.mode = MODE_SHARED;
         st.stage = STAGE_PATH;
@@ -44,7 +48,8 @@ pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool
     } else {
         primary_missed_virtual(scene, &mut st);
     }
-    st.rays.primary = 1;
+    // A replayed sample's primary ray was counted when it was first taken.
+    st.rays.primary = u32::from(!real_pass);
     st
 }
 
@@ -90,7 +95,11 @@ fn primary_missed_virtual(scene: &PackedScene, st: &mut PathState) {
         let u = sample_4d(sample_key(scene, st), SET_PRIMARY_ROULETTE);
         survives = u[0] < probability;
     }
-    st.throughput = if survives { Vec3::splat(1.0 / probability) } else { Vec3::ZERO };
+    st.throughput = if survives {
+        Vec3::splat(1.0 / probability)
+    } else {
+        Vec3::ZERO
+    };
     if survives || scene.frame.flags & FRAME_AOVS != 0 {
         st.stage = STAGE_PRIMARY_REAL;
         st.request = REQUEST_CLOSEST_REAL;
@@ -155,7 +164,11 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.request = st.shadow_request;
             st.direction = st.shadow_direction;
             st.t_max = st.shadow_t_max;
-            st.stage = if st.mode == MODE_DIFFERENCE { STAGE_DIFFERENCE_SHADOW } else { STAGE_PATH_SHADOW };
+            st.stage = if st.mode == MODE_DIFFERENCE {
+                STAGE_DIFFERENCE_SHADOW
+            } else {
+                STAGE_PATH_SHADOW
+            };
             return;
         }
         if st.pending & PENDING_NEXT != 0 {
@@ -169,7 +182,11 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
                 st.request = REQUEST_VIRTUAL_THEN_REAL;
             } else {
                 st.stage = STAGE_PATH;
-                st.request = if st.mode == MODE_REAL { REQUEST_CLOSEST_REAL } else { REQUEST_CLOSEST_MIXED };
+                st.request = if st.mode == MODE_REAL {
+                    REQUEST_CLOSEST_REAL
+                } else {
+                    REQUEST_CLOSEST_MIXED
+                };
             }
             return;
         }
@@ -198,7 +215,11 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.depth = st.difference_depth;
             st.t_max = f32::INFINITY;
             st.stage = STAGE_DIFFERENCE_BSDF;
-            st.request = if st.difference_lambertian { REQUEST_REAL_UNLESS_COVERED } else { REQUEST_CLOSEST_EACH };
+            st.request = if st.difference_lambertian {
+                REQUEST_REAL_UNLESS_COVERED
+            } else {
+                REQUEST_CLOSEST_EACH
+            };
             return;
         }
         st.stage = STAGE_DONE;
@@ -209,7 +230,11 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
 /// The next vertex of a path, or its escape. False: the state already asks for its next ray.
 fn path_hit(scene: &PackedScene, st: &mut PathState) -> bool {
     let virtual_first = st.mode != MODE_REAL && virtual_is_nearer(st.hit_virtual, st.hit_real);
-    let hit = if virtual_first { st.hit_virtual } else { st.hit_real };
+    let hit = if virtual_first {
+        st.hit_virtual
+    } else {
+        st.hit_real
+    };
     st.depth += 1;
     if hit.triangle == NONE {
         path_escape(scene, st);
@@ -281,7 +306,11 @@ fn path_shadow(scene: &PackedScene, st: &mut PathState) {
 fn shadow_counts(st: &PathState) -> bool {
     let open_real = st.hit_real.triangle == NONE;
     let open_virtual = st.hit_virtual.triangle == NONE;
-    if st.shadow_request == REQUEST_SHADOW_DIFFERENCE { !open_virtual && open_real } else { open_virtual && open_real }
+    if st.shadow_request == REQUEST_SHADOW_DIFFERENCE {
+        !open_virtual && open_real
+    } else {
+        open_virtual && open_real
+    }
 }
 
 /// A direction drawn from the BSDF: the recursion where real geometry is nearer, the other half of (b) where virtual geometry is.
@@ -304,7 +333,13 @@ fn difference_bsdf(scene: &PackedScene, st: &mut PathState) {
 
 /// Effective density of the cone technique at the vertex that the present ray leaves.
 fn vertex_cone_density(scene: &PackedScene, st: &PathState) -> f32 {
-    st.difference_cone_probability * cone_pdf(&scene.frame, st.position, st.difference_normal, st.direction)
+    st.difference_cone_probability
+        * cone_pdf(
+            &scene.frame,
+            st.position,
+            st.difference_normal,
+            st.direction,
+        )
 }
 
 /// Virtual geometry is nearer: its radiance counts, and what the real world shows behind it is taken away.

@@ -12,8 +12,8 @@ use crate::light::cones::{cone_solid_angle_fraction, direction_meets_spheres};
 use crate::light::environment::env_sample;
 use crate::math::{hash_combine, hash_u32, uniform_from_bits};
 use crate::packed::{
-    Frame, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, Light, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH,
-    PackedScene, PixelInfo,
+    Frame, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, Light, NONE,
+    PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene, PixelInfo,
 };
 
 /// Share of the sky (cosine-weighted) covered by virtual geometry from which on every sample is evaluated.
@@ -31,17 +31,31 @@ const DILATION_PX: usize = 2;
 pub fn pilot(scene: &PackedScene) -> Vec<PixelInfo> {
     let width = scene.frame.width as usize;
     let height = scene.frame.height as usize;
-    let nothing_virtual = scene.frame.sphere_count == 0 && !scene.lights.iter().any(|l| l.side == 1);
+    let nothing_virtual =
+        scene.frame.sphere_count == 0 && !scene.lights.iter().any(|l| l.side == 1);
     if nothing_virtual {
-        return vec![PixelInfo { difference_probability: 1.0, flags: PIXEL_OUT_OF_REACH }; width * height];
+        return vec![
+            PixelInfo {
+                difference_probability: 1.0,
+                flags: PIXEL_OUT_OF_REACH
+            };
+            width * height
+        ];
     }
-    let pinhole = Frame { aperture_radius: 0.0, ..scene.frame };
+    let pinhole = Frame {
+        aperture_radius: 0.0,
+        ..scene.frame
+    };
     let directions = environment_directions(scene);
     let mut pixels: Vec<PixelInfo> = (0..width * height)
         .into_par_iter()
         .map(|i| {
             let beam = Beam::of_pixel(&scene.frame, &pinhole, i as u32);
-            let flags = if beam.may_meet_spheres(&scene.frame) { PIXEL_BEAM_MAY_MEET_VIRTUAL } else { 0 };
+            let flags = if beam.may_meet_spheres(&scene.frame) {
+                PIXEL_BEAM_MAY_MEET_VIRTUAL
+            } else {
+                0
+            };
             let out_of_reach = flags == 0 && !beam.may_meet_real(scene);
             PixelInfo {
                 difference_probability: difference_probability(scene, &beam, &directions),
@@ -75,12 +89,19 @@ impl Beam {
     fn of_pixel(frame: &Frame, pinhole: &Frame, pixel: u32) -> Self {
         let x = (pixel % frame.width) as f32;
         let y = (pixel / frame.width) as f32;
-        let axis = -Vec3::new(frame.camera_back[0], frame.camera_back[1], frame.camera_back[2]);
+        let axis = -Vec3::new(
+            frame.camera_back[0],
+            frame.camera_back[1],
+            frame.camera_back[2],
+        );
         let centre = camera_ray(pinhole, x + 0.5, y + 0.5, 0.5, 0.5);
         let at_depth_1 = |d: Vec3| d / d.dot(axis).max(1e-6);
         let footprint = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
             .iter()
-            .map(|(dx, dy)| at_depth_1(camera_ray(pinhole, x + dx, y + dy, 0.5, 0.5).direction).distance(at_depth_1(centre.direction)))
+            .map(|(dx, dy)| {
+                at_depth_1(camera_ray(pinhole, x + dx, y + dy, 0.5, 0.5).direction)
+                    .distance(at_depth_1(centre.direction))
+            })
             .fold(0.0, f32::max);
         Self {
             origin: centre.origin,
@@ -94,7 +115,10 @@ impl Beam {
 
     /// Largest distance from the centre ray over the axis depths z0..z1; convex in z, so the ends decide.
     fn radius(&self, z0: f32, z1: f32) -> f32 {
-        let blur = |z: f32| self.aperture_radius * (1.0 - z * self.inv_focus_distance).abs() + self.footprint * z.max(0.0);
+        let blur = |z: f32| {
+            self.aperture_radius * (1.0 - z * self.inv_focus_distance).abs()
+                + self.footprint * z.max(0.0)
+        };
         blur(z0.max(0.0)).max(blur(z1.max(0.0)))
     }
 
@@ -109,7 +133,9 @@ impl Beam {
     }
 
     fn may_meet_spheres(&self, frame: &Frame) -> bool {
-        frame.spheres[..frame.sphere_count as usize].iter().any(|s| self.may_meet_sphere(Vec3::new(s[0], s[1], s[2]), s[3]))
+        frame.spheres[..frame.sphere_count as usize]
+            .iter()
+            .any(|s| self.may_meet_sphere(Vec3::new(s[0], s[1], s[2]), s[3]))
     }
 
     fn may_meet_real(&self, scene: &PackedScene) -> bool {
@@ -134,7 +160,13 @@ fn environment_directions(scene: &PackedScene) -> Vec<Vec3> {
 }
 
 fn difference_probability(scene: &PackedScene, beam: &Beam, directions: &[Vec3]) -> f32 {
-    let ray = Ray { origin: beam.origin, direction: beam.direction, t_min: 0.0, t_max: f32::INFINITY, skip: NONE };
+    let ray = Ray {
+        origin: beam.origin,
+        direction: beam.direction,
+        t_min: 0.0,
+        t_max: f32::INFINITY,
+        skip: NONE,
+    };
     let hit = scene.real_bvh.closest(&ray);
     if hit.triangle == NONE {
         return PROBABILITY_FLOOR;
@@ -144,13 +176,27 @@ fn difference_probability(scene: &PackedScene, beam: &Beam, directions: &[Vec3])
         let p = scene.vertices[v as usize].position_u0;
         Vec3::new(p[0], p[1], p[2])
     });
-    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
-    let normal = if normal.dot(beam.direction) > 0.0 { -normal } else { normal };
+    let normal = (corners[1] - corners[0])
+        .cross(corners[2] - corners[0])
+        .normalize_or_zero();
+    let normal = if normal.dot(beam.direction) > 0.0 {
+        -normal
+    } else {
+        normal
+    };
     let mut importance = REACH_GAIN * cone_solid_angle_fraction(&scene.frame, position, normal);
-    if scene.lights.len() > MAX_LIGHTS_EXAMINED || scene.lights.iter().any(|l| light_may_be_blocked(&scene.frame, l, position)) {
+    if scene.lights.len() > MAX_LIGHTS_EXAMINED
+        || scene
+            .lights
+            .iter()
+            .any(|l| light_may_be_blocked(&scene.frame, l, position))
+    {
         importance = 1.0;
     }
-    let blocked = directions.iter().filter(|&&d| d.dot(normal) > 0.0 && direction_meets_spheres(&scene.frame, position, d)).count();
+    let blocked = directions
+        .iter()
+        .filter(|&&d| d.dot(normal) > 0.0 && direction_meets_spheres(&scene.frame, position, d))
+        .count();
     importance += 4.0 * blocked as f32 / ENVIRONMENT_TRIALS as f32;
     importance.clamp(PROBABILITY_FLOOR, 1.0)
 }
@@ -167,34 +213,49 @@ fn light_may_be_blocked(frame: &Frame, light: &Light, position: Vec3) -> bool {
     let (centre, radius) = match light.kind {
         LIGHT_DIRECTIONAL => return direction_meets_spheres(frame, position, -v(light.axis_u)),
         LIGHT_POINT | LIGHT_SPOT => (v(light.position), 0.0),
-        _ => (v(light.position) + 0.5 * (v(light.axis_u) + v(light.axis_v)), 0.5 * (v(light.axis_u).length() + v(light.axis_v).length())),
+        _ => (
+            v(light.position) + 0.5 * (v(light.axis_u) + v(light.axis_v)),
+            0.5 * (v(light.axis_u).length() + v(light.axis_v).length()),
+        ),
     };
     let to_light = centre - position;
     let light_distance = to_light.length();
     let light_angle = (radius / light_distance.max(1e-20)).min(1.0).asin();
-    frame.spheres[..frame.sphere_count as usize].iter().any(|s| {
-        let to_sphere = Vec3::new(s[0], s[1], s[2]) - position;
-        let distance = to_sphere.length();
-        if distance <= s[3] {
-            return true;
-        }
-        if distance - s[3] > light_distance + radius {
-            return false;
-        }
-        let between = (to_sphere.dot(to_light) / (distance * light_distance.max(1e-20))).clamp(-1.0, 1.0).acos();
-        between <= light_angle + (s[3] / distance).asin()
-    })
+    frame.spheres[..frame.sphere_count as usize]
+        .iter()
+        .any(|s| {
+            let to_sphere = Vec3::new(s[0], s[1], s[2]) - position;
+            let distance = to_sphere.length();
+            if distance <= s[3] {
+                return true;
+            }
+            if distance - s[3] > light_distance + radius {
+                return false;
+            }
+            let between = (to_sphere.dot(to_light) / (distance * light_distance.max(1e-20)))
+                .clamp(-1.0, 1.0)
+                .acos();
+            between <= light_angle + (s[3] / distance).asin()
+        })
 }
 
 /// Largest probability of the neighbourhood, separably.
 fn dilate(pixels: &mut [PixelInfo], width: usize, height: usize) {
-    let pass = |pixels: &mut [PixelInfo], count: usize, stride: usize, lines: usize, line_stride: usize| {
+    let pass = |pixels: &mut [PixelInfo],
+                count: usize,
+                stride: usize,
+                lines: usize,
+                line_stride: usize| {
         for line in 0..lines {
             let at = |i: usize| line * line_stride + i * stride;
-            let values: Vec<f32> = (0..count).map(|i| pixels[at(i)].difference_probability).collect();
+            let values: Vec<f32> = (0..count)
+                .map(|i| pixels[at(i)].difference_probability)
+                .collect();
             for i in 0..count {
-                let window = &values[i.saturating_sub(DILATION_PX)..(i + DILATION_PX + 1).min(count)];
-                pixels[at(i)].difference_probability = window.iter().fold(0.0, |a: f32, &b| a.max(b));
+                let window =
+                    &values[i.saturating_sub(DILATION_PX)..(i + DILATION_PX + 1).min(count)];
+                pixels[at(i)].difference_probability =
+                    window.iter().fold(0.0, |a: f32, &b| a.max(b));
             }
         }
     };

@@ -22,49 +22,80 @@ pub fn render_pass(scene: &PackedScene, film: &mut Film, pass: Pass, cancel: &Ca
     let first_sample = film.first_sample;
     let selected: Vec<bool> = match pass {
         Pass::Main { .. } => Vec::new(),
-        Pass::Real { everywhere } => {
-            (0..film.pixels.len()).map(|i| film.needs_real(i) || (everywhere && wants_real(&film.pixels[i]))).collect()
-        }
+        Pass::Real { everywhere } => (0..film.pixels.len())
+            .map(|i| film.needs_real(i) || (everywhere && wants_real(&film.pixels[i])))
+            .collect(),
     };
     let mut no_guides: Vec<GuideSums> = Vec::new();
     let with_guides = !film.guides.is_empty();
     if !with_guides {
-        no_guides.resize(film.pixels.len().div_ceil(TILE_PIXELS), GuideSums::default());
+        no_guides.resize(
+            film.pixels.len().div_ceil(TILE_PIXELS),
+            GuideSums::default(),
+        );
     }
-    let guides: &mut [GuideSums] = if with_guides { &mut film.guides } else { &mut no_guides };
+    let guides: &mut [GuideSums] = if with_guides {
+        &mut film.guides
+    } else {
+        &mut no_guides
+    };
     let guide_chunk = if with_guides { TILE_PIXELS } else { 1 };
-    film.pixels.par_chunks_mut(TILE_PIXELS).zip(guides.par_chunks_mut(guide_chunk)).enumerate().for_each(|(tile, (sums, guides))| {
-        if cancel.is_cancelled() {
-            return;
-        }
-        let mut counts = RayCounts64::default();
-        for (i, sums) in sums.iter_mut().enumerate() {
-            let pixel = tile * TILE_PIXELS + i;
-            match pass {
-                Pass::Main { end } => {
-                    if scene.pixels[pixel].flags & PIXEL_OUT_OF_REACH != 0 {
-                        continue;
+    film.pixels
+        .par_chunks_mut(TILE_PIXELS)
+        .zip(guides.par_chunks_mut(guide_chunk))
+        .enumerate()
+        .for_each(|(tile, (sums, guides))| {
+            if cancel.is_cancelled() {
+                return;
+            }
+            let mut counts = RayCounts64::default();
+            for (i, sums) in sums.iter_mut().enumerate() {
+                let pixel = tile * TILE_PIXELS + i;
+                match pass {
+                    Pass::Main { end } => {
+                        if scene.pixels[pixel].flags & PIXEL_OUT_OF_REACH != 0 {
+                            continue;
+                        }
+                        while first_sample + sums.n < end {
+                            let guide = if with_guides {
+                                Some(&mut guides[i])
+                            } else {
+                                None
+                            };
+                            main_sample(
+                                scene,
+                                pixel as u32,
+                                first_sample + sums.n,
+                                sums,
+                                guide,
+                                &mut counts,
+                            );
+                        }
                     }
-                    while first_sample + sums.n < end {
-                        let guide = if with_guides { Some(&mut guides[i]) } else { None };
-                        main_sample(scene, pixel as u32, first_sample + sums.n, sums, guide, &mut counts);
-                    }
-                }
-                Pass::Real { .. } => {
-                    if !selected[pixel] {
-                        continue;
-                    }
-                    while sums.n_real < sums.n {
-                        let index = first_sample + sums.n_real;
-                        let st = run(scene, begin_sample(scene, pixel as u32, index, true), &mut counts);
-                        pixel_add_real(sums, index, st.mask != 0, st.radiance * scene.frame.exposure_scale);
+                    Pass::Real { .. } => {
+                        if !selected[pixel] {
+                            continue;
+                        }
+                        while sums.n_real < sums.n {
+                            let index = first_sample + sums.n_real;
+                            let st = run(
+                                scene,
+                                begin_sample(scene, pixel as u32, index, true),
+                                &mut counts,
+                            );
+                            pixel_add_real(
+                                sums,
+                                index,
+                                st.mask != 0,
+                                st.radiance * scene.frame.exposure_scale,
+                            );
+                        }
                     }
                 }
             }
-        }
-        totals.add(&counts);
-        cancel.progress(sums.len() as u64);
-    });
+            totals.add(&counts);
+            cancel.progress(sums.len() as u64);
+        });
     totals.get()
 }
 
@@ -73,21 +104,47 @@ fn wants_real(sums: &PixelSums) -> bool {
     sums.m < sums.n && sums.n_real < sums.n
 }
 
-fn main_sample(scene: &PackedScene, pixel: u32, index: u32, sums: &mut PixelSums, guide: Option<&mut GuideSums>, counts: &mut RayCounts64) {
+fn main_sample(
+    scene: &PackedScene,
+    pixel: u32,
+    index: u32,
+    sums: &mut PixelSums,
+    guide: Option<&mut GuideSums>,
+    counts: &mut RayCounts64,
+) {
     let st = run(scene, begin_sample(scene, pixel, index, false), counts);
     let scale = scene.frame.exposure_scale;
     let is_virtual = st.mask != 0;
     let (contribution, real) = if scene.frame.estimator == ESTIMATOR_PAPER {
         let real = st.radiance_real * scale;
-        (if is_virtual { st.radiance * scale } else { (st.radiance - st.radiance_real) * scale }, Some(real))
+        (
+            if is_virtual {
+                st.radiance * scale
+            } else {
+                (st.radiance - st.radiance_real) * scale
+            },
+            Some(real),
+        )
     } else {
         (st.radiance * scale, None)
     };
-    sums.add(index, &Sample { is_virtual, contribution, real, guide: None });
+    sums.add(
+        index,
+        &Sample {
+            is_virtual,
+            contribution,
+            real,
+            guide: None,
+        },
+    );
     if let Some(sums) = guide
         && st.depth_m.is_finite()
     {
-        let guide = Guide { depth_m: st.depth_m, normal: st.normal, albedo: st.albedo };
+        let guide = Guide {
+            depth_m: st.depth_m,
+            normal: st.normal,
+            albedo: st.albedo,
+        };
         guide_add(sums, guide.depth_m, guide.normal, guide.albedo);
     }
 }
@@ -103,7 +160,11 @@ fn run(scene: &PackedScene, mut st: PathState, counts: &mut RayCounts64) -> Path
 
 /// Real radiance of one sample before exposure, and the albedo of its first hit (0 where nothing is hit); wants `FRAME_AOVS`.
 pub fn render_first_hit(scene: &PackedScene, pixel: u32, index: u32) -> (Vec3, Vec3) {
-    let st = run(scene, begin_sample(scene, pixel, index, true), &mut RayCounts64::default());
+    let st = run(
+        scene,
+        begin_sample(scene, pixel, index, true),
+        &mut RayCounts64::default(),
+    );
     (st.radiance, st.albedo)
 }
 
@@ -114,7 +175,11 @@ struct RayCounts64 {
 
 impl RayCounts64 {
     fn add(&mut self, c: &RayCounts) {
-        for (sum, x) in self.kinds.iter_mut().zip([c.primary, c.mixed, c.real, c.mixed_shadow, c.real_shadow]) {
+        for (sum, x) in
+            self.kinds
+                .iter_mut()
+                .zip([c.primary, c.mixed, c.real, c.mixed_shadow, c.real_shadow])
+        {
             *sum += u64::from(x);
         }
     }
@@ -133,7 +198,14 @@ impl AtomicTotals {
     }
 
     fn get(&self) -> RayTotals {
-        let [primary, mixed, real, mixed_shadow, real_shadow] = [0, 1, 2, 3, 4].map(|i| self.kinds[i].load(Ordering::Relaxed));
-        RayTotals { primary, mixed, real, mixed_shadow, real_shadow }
+        let [primary, mixed, real, mixed_shadow, real_shadow] =
+            [0, 1, 2, 3, 4].map(|i| self.kinds[i].load(Ordering::Relaxed));
+        RayTotals {
+            primary,
+            mixed,
+            real,
+            mixed_shadow,
+            real_shadow,
+        }
     }
 }

@@ -219,4 +219,9 @@ impl PathState {
 }
 
 /// A ray that met nothing.
-pub const MISS: Hit = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, triangle: NONE };
+pub const MISS: Hit = Hit {
+    t: f32::INFINITY,
+    u: 0.0,
+    v: 0.0,
+    triangle: NONE,
+};

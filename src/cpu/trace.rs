@@ -89,15 +89,42 @@ pub fn answer(scene: &PackedScene, st: &mut PathState) {
 }
 
 /// What an any-hit query that met something answers: only `triangle != NONE` means anything.
-const BLOCKED: Hit = Hit { t: 0.0, u: 0.0, v: 0.0, triangle: 0 };
+const BLOCKED: Hit = Hit {
+    t: 0.0,
+    u: 0.0,
+    v: 0.0,
+    triangle: 0,
+};
 
 /// One world's answer. A ray that leaves a surface starts past it in that surface's own world and before it in the other one, so that it
 /// neither meets itself nor slips through what coincides with it.
 fn trace_world(scene: &PackedScene, st: &PathState, world: u32, t_max: f32, any_hit: bool) -> Hit {
-    let along = if st.direction.dot(st.offset) < 0.0 { -st.offset } else { st.offset };
-    let origin = if world == st.side { st.position + along } else { st.position - along };
-    let mut ray = Ray { origin, direction: st.direction, t_min: if world == WORLD_REAL { st.real_t_min } else { 0.0 }, t_max, skip: NONE };
-    let bvh = if world == WORLD_REAL { &scene.real_bvh } else { &scene.virtual_bvh };
+    let along = if st.direction.dot(st.offset) < 0.0 {
+        -st.offset
+    } else {
+        st.offset
+    };
+    let origin = if world == st.side {
+        st.position + along
+    } else {
+        st.position - along
+    };
+    let mut ray = Ray {
+        origin,
+        direction: st.direction,
+        t_min: if world == WORLD_REAL {
+            st.real_t_min
+        } else {
+            0.0
+        },
+        t_max,
+        skip: NONE,
+    };
+    let bvh = if world == WORLD_REAL {
+        &scene.real_bvh
+    } else {
+        &scene.virtual_bvh
+    };
     if scene.frame.flags & FRAME_ALPHA == 0 {
         if any_hit {
             return if bvh.any(&ray) { BLOCKED } else { MISS };
@@ -123,6 +150,12 @@ fn meets(scene: &PackedScene, st: &PathState, hit: Hit) -> bool {
         return true;
     }
     let alpha = surface_alpha(scene, hit);
-    let bits = hash_combine(hash_combine(hash_combine(hash_combine(scene.frame.seed, st.pixel), st.index), hit.triangle), st.depth);
+    let bits = hash_combine(
+        hash_combine(
+            hash_combine(hash_combine(scene.frame.seed, st.pixel), st.index),
+            hit.triangle,
+        ),
+        st.depth,
+    );
     uniform_from_bits(bits) < alpha
 }

@@ -4,9 +4,13 @@ use glam::Vec3;
 
 use super::contribution::*;
 use super::state::*;
-use crate::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
+use crate::light::cones::{
+    cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
+};
 use crate::light::lights::{light_pdf_hit, light_sample};
-use crate::material::{Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample};
+use crate::material::{
+    Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample,
+};
 use crate::math::exp_;
 use crate::packed::{MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE, PackedScene};
 
@@ -43,25 +47,40 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     if !difference {
         if st.medium != NONE {
             let sigma = scene.materials[st.medium as usize].sigma_a;
-            st.throughput *= Vec3::new(exp_(-sigma[0] * distance), exp_(-sigma[1] * distance), exp_(-sigma[2] * distance));
+            st.throughput *= Vec3::new(
+                exp_(-sigma[0] * distance),
+                exp_(-sigma[1] * distance),
+                exp_(-sigma[2] * distance),
+            );
         }
         add_emission(scene, st, s, distance);
     }
-    if st.depth > scene.frame.max_bounces || s.flags & EMITS_ONLY != 0 || st.throughput == Vec3::ZERO {
+    if st.depth > scene.frame.max_bounces
+        || s.flags & EMITS_ONLY != 0
+        || st.throughput == Vec3::ZERO
+    {
         return;
     }
     st.position = s.position;
     st.offset = s.ng * s.error;
-    st.side = if st.vertex_hit.triangle >= scene.frame.real_triangle_count { 1 } else { 0 };
+    st.side = if st.vertex_hit.triangle >= scene.frame.real_triangle_count {
+        1
+    } else {
+        0
+    };
     st.real_t_min = scene.materials[s.material as usize].self_shadow_bias;
 
-    let mut roulette = Roulette { cone: 1.0, bsdf: 1.0 };
+    let mut roulette = Roulette {
+        cone: 1.0,
+        bsdf: 1.0,
+    };
     if difference {
         let strength = (st.throughput * bsdf_albedo(s, wo)).abs().max_element();
         let reach = cone_solid_angle_fraction(&scene.frame, s.position, s.ns);
         roulette.cone = (CONE_ROULETTE_GAIN * strength * reach).clamp(CONE_ROULETTE_FLOOR, 1.0);
         if bsdf_is_lambertian(s) {
-            roulette.bsdf = (RECURSION_ROULETTE_GAIN * strength * reach).clamp(RECURSION_ROULETTE_FLOOR, 1.0);
+            roulette.bsdf =
+                (RECURSION_ROULETTE_GAIN * strength * reach).clamp(RECURSION_ROULETTE_FLOOR, 1.0);
         }
     }
     next_event(scene, st, s, wo, roulette);
@@ -77,7 +96,10 @@ fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: 
     }
     let mut weight = 1.0;
     if s.light != NONE && st.density != DELTA_DENSITY {
-        weight = density_weight(st.density, light_pdf_hit(scene, s.light, st.direction, distance));
+        weight = density_weight(
+            st.density,
+            light_pdf_hit(scene, s.light, st.direction, distance),
+        );
     }
     let light = st.throughput * s.emission * weight;
     accumulate(scene, st, light);
@@ -90,7 +112,15 @@ fn next_event(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, ro
         return;
     }
     let difference = st.mode == MODE_DIFFERENCE;
-    let u = draw(scene, st, if difference { SET_DIFFERENCE_LIGHT } else { SET_PATH_LIGHT });
+    let u = draw(
+        scene,
+        st,
+        if difference {
+            SET_DIFFERENCE_LIGHT
+        } else {
+            SET_PATH_LIGHT
+        },
+    );
     let l = light_sample(scene, s.position, u);
     let real_light = l.side == 0;
     if l.pdf <= 0.0 || (st.mode == MODE_REAL && !real_light) {
@@ -156,12 +186,26 @@ fn plan_cone(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, rou
 }
 
 /// The BSDF's own direction: the path's next ray, or (c) the recursion of the difference.
-fn plan_continuation(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, roulette: Roulette) {
+fn plan_continuation(
+    scene: &PackedScene,
+    st: &mut PathState,
+    s: &Surface,
+    wo: Vec3,
+    roulette: Roulette,
+) {
     let difference = st.mode == MODE_DIFFERENCE;
     if difference && bsdf_is_lambertian(s) && st.depth >= scene.frame.max_bounces {
         return;
     }
-    let u = draw(scene, st, if difference { SET_DIFFERENCE_BSDF } else { SET_PATH_BSDF });
+    let u = draw(
+        scene,
+        st,
+        if difference {
+            SET_DIFFERENCE_BSDF
+        } else {
+            SET_PATH_BSDF
+        },
+    );
     if u[3] >= roulette.bsdf {
         return;
     }

@@ -34,7 +34,13 @@ fn cone_of(frame: &Frame, i: u32, position: Vec3, ns: Vec3) -> Cone {
     let distance_squared = dot3(to_centre, to_centre);
     let radius_squared = sphere[3] * sphere[3];
     if radius_squared >= distance_squared * WIDE_SIN2 {
-        return Cone { axis: ns, sin2: 1.0, one_minus_cos: 1.0, wide: true, weight: 1.0 };
+        return Cone {
+            axis: ns,
+            sin2: 1.0,
+            one_minus_cos: 1.0,
+            wide: true,
+            weight: 1.0,
+        };
     }
     let axis = to_centre / safe_sqrt(distance_squared);
     let sin2 = radius_squared / distance_squared;
@@ -46,7 +52,13 @@ fn cone_of(frame: &Frame, i: u32, position: Vec3, ns: Vec3) -> Cone {
     if cos_axis < cos {
         largest = cos_axis * cos + safe_sqrt(1.0 - cos_axis * cos_axis) * safe_sqrt(sin2);
     }
-    Cone { axis, sin2, one_minus_cos, wide: false, weight: (2.0 * one_minus_cos * largest).max(0.0) }
+    Cone {
+        axis,
+        sin2,
+        one_minus_cos,
+        wide: false,
+        weight: (2.0 * one_minus_cos * largest).max(0.0),
+    }
 }
 
 /// A direction inside the cones.
@@ -64,7 +76,10 @@ pub fn cone_sample(frame: &Frame, position: Vec3, ns: Vec3, u: [f32; 3]) -> Cone
         total += cone_of(frame, i, position, ns).weight;
     }
     if total <= 0.0 {
-        return ConeSample { direction: ns, pdf: 0.0 };
+        return ConeSample {
+            direction: ns,
+            pdf: 0.0,
+        };
     }
     let mut left = u[0] * total;
     let mut chosen = cone_of(frame, 0, position, ns);
@@ -89,7 +104,10 @@ pub fn cone_sample(frame: &Frame, position: Vec3, ns: Vec3, u: [f32; 3]) -> Cone
     let (sin_phi, cos_phi) = sincos_2pi(u[2]);
     let (tangent, bitangent) = orthonormal_basis(chosen.axis);
     let direction = tangent * (sin * cos_phi) + bitangent * (sin * sin_phi) + chosen.axis * cos;
-    ConeSample { direction, pdf: cone_pdf(frame, position, ns, direction) }
+    ConeSample {
+        direction,
+        pdf: cone_pdf(frame, position, ns, direction),
+    }
 }
 
 /// Density of [`cone_sample`] in `direction` (unit).

@@ -37,10 +37,18 @@ pub fn environment_table(width: u32, height: u32, texels: &[f32]) -> Environment
     let mut conditionals = vec![0.0_f32; rows * (w + 1)];
     for r in 0..rows {
         let (top, bottom) = (r.max(1) - 1, r.min(h - 1));
-        let means: Vec<f64> =
-            (0..w).map(|i| 0.25 * (lum(i, top) + lum((i + 1) % w, top) + lum(i, bottom) + lum((i + 1) % w, bottom))).collect();
-        let cos_at = |row_edge: f64| (std::f64::consts::PI * (row_edge / h as f64).clamp(0.0, 1.0)).cos();
-        let solid_angle = (cos_at(r as f64 - 0.5) - cos_at(r as f64 + 0.5)) * std::f64::consts::TAU / w as f64;
+        let means: Vec<f64> = (0..w)
+            .map(|i| {
+                0.25 * (lum(i, top)
+                    + lum((i + 1) % w, top)
+                    + lum(i, bottom)
+                    + lum((i + 1) % w, bottom))
+            })
+            .collect();
+        let cos_at =
+            |row_edge: f64| (std::f64::consts::PI * (row_edge / h as f64).clamp(0.0, 1.0)).cos();
+        let solid_angle =
+            (cos_at(r as f64 - 0.5) - cos_at(r as f64 + 0.5)) * std::f64::consts::TAU / w as f64;
         let total: f64 = means.iter().sum();
         row_sums[r] = total * solid_angle;
         fill_cdf(&mut conditionals[r * (w + 1)..][..w + 1], &means);
@@ -51,7 +59,11 @@ pub fn environment_table(width: u32, height: u32, texels: &[f32]) -> Environment
     cdf.extend_from_slice(&conditionals);
     EnvironmentTable {
         cdf,
-        normaliser: if integral > 0.0 { (1.0 / integral) as f32 } else { 0.0 },
+        normaliser: if integral > 0.0 {
+            (1.0 / integral) as f32
+        } else {
+            0.0
+        },
         mean_luminance: integral / (4.0 * std::f64::consts::PI),
     }
 }
@@ -62,7 +74,11 @@ fn fill_cdf(cdf: &mut [f32], weights: &[f64]) {
     let mut sum = 0.0;
     for (i, weight) in weights.iter().enumerate() {
         sum += weight;
-        cdf[i + 1] = if total > 0.0 { (sum / total) as f32 } else { (i + 1) as f32 / weights.len() as f32 };
+        cdf[i + 1] = if total > 0.0 {
+            (sum / total) as f32
+        } else {
+            (i + 1) as f32 / weights.len() as f32
+        };
     }
     cdf[weights.len()] = 1.0;
 }
@@ -87,7 +103,11 @@ fn env_coordinates(frame: &Frame, direction: Vec3) -> (f32, f32) {
 
 fn env_texel(scene: &PackedScene, i: u32, j: u32) -> Vec3 {
     let at = 3 * (j * scene.frame.env_width + i) as usize;
-    Vec3::new(scene.env_texels[at], scene.env_texels[at + 1], scene.env_texels[at + 2])
+    Vec3::new(
+        scene.env_texels[at],
+        scene.env_texels[at + 1],
+        scene.env_texels[at + 2],
+    )
 }
 
 /// The four texels around a point of the map and where it lies between them.
@@ -127,7 +147,11 @@ fn env_interpolate(n: &Neighbours) -> Vec3 {
 }
 
 fn env_scale(frame: &Frame) -> Vec3 {
-    Vec3::new(frame.env_radiance[0], frame.env_radiance[1], frame.env_radiance[2])
+    Vec3::new(
+        frame.env_radiance[0],
+        frame.env_radiance[1],
+        frame.env_radiance[2],
+    )
 }
 
 /// Radiance that arrives from `direction` (unit, pointing away from the scene point).
@@ -174,7 +198,11 @@ pub fn env_sample(scene: &PackedScene, u0: f32, u1: f32) -> EnvSample {
         let y = 1.0 - 2.0 * u0;
         let r = safe_sqrt(1.0 - y * y);
         let (sin, cos) = sincos_2pi(u1);
-        return EnvSample { direction: Vec3::new(r * cos, y, r * sin), radiance: env_scale(frame), pdf: 0.25 / PI };
+        return EnvSample {
+            direction: Vec3::new(r * cos, y, r * sin),
+            radiance: env_scale(frame),
+            pdf: 0.25 / PI,
+        };
     }
     let rows = frame.env_height + 1;
     let row = find_interval(&scene.env_cdf, 0, rows, u0);
@@ -194,9 +222,17 @@ pub fn env_sample(scene: &PackedScene, u0: f32, u1: f32) -> EnvSample {
     let (sin, cos) = sincos_2pi((column as f32 + 0.5 + fx) / frame.env_width as f32 - 0.5);
     // Azimuth 0 is the map's centre column: -Z, with +X to its right.
     let (x, z) = (r * sin, -r * cos);
-    let direction = Vec3::new(x * frame.env_cos + z * frame.env_sin, y, z * frame.env_cos - x * frame.env_sin);
+    let direction = Vec3::new(
+        x * frame.env_cos + z * frame.env_sin,
+        y,
+        z * frame.env_cos - x * frame.env_sin,
+    );
     // The cell is looked up from the direction, so that this density and env_direction_pdf's are the same number.
     let (u, v) = env_coordinates(frame, direction);
     let n = env_neighbours(scene, u, v);
-    EnvSample { direction, radiance: env_interpolate(&n) * env_scale(frame), pdf: env_cell_luminance(&n) * frame.env_radiance[3] }
+    EnvSample {
+        direction,
+        radiance: env_interpolate(&n) * env_scale(frame),
+        pdf: env_cell_luminance(&n) * frame.env_radiance[3],
+    }
 }

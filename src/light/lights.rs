@@ -4,7 +4,10 @@ use glam::Vec3;
 
 use super::environment::{env_direction_pdf, env_sample};
 use crate::math::{dot3, length3, safe_sqrt};
-use crate::packed::{LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE, PackedScene};
+use crate::packed::{
+    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE,
+    PackedScene,
+};
 
 /// Light from one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +26,14 @@ pub struct LightSample {
 }
 
 fn no_light() -> LightSample {
-    LightSample { direction: Vec3::Z, distance: 0.0, radiance: Vec3::ZERO, pdf: 0.0, delta: false, side: 0 }
+    LightSample {
+        direction: Vec3::Z,
+        distance: 0.0,
+        radiance: Vec3::ZERO,
+        pdf: 0.0,
+        delta: false,
+        side: 0,
+    }
 }
 
 fn xyz(v: [f32; 4]) -> Vec3 {
@@ -35,7 +45,11 @@ pub fn light_select(scene: &PackedScene, u: f32) -> u32 {
     let scaled = u * scene.frame.light_count as f32;
     let index = (scaled as u32).min(scene.frame.light_count - 1);
     let light = &scene.lights[index as usize];
-    if scaled - index as f32 <= light.alias_threshold { index } else { light.alias }
+    if scaled - index as f32 <= light.alias_threshold {
+        index
+    } else {
+        light.alias
+    }
 }
 
 /// Draws a light with u[0] and a point on it with u[1], u[2].
@@ -78,7 +92,14 @@ fn sample_point_light(light: &Light, position: Vec3) -> LightSample {
     if light.kind == LIGHT_SPOT {
         radiance *= spot_falloff(light, -dot3(direction, xyz(light.axis_u)));
     }
-    LightSample { direction, distance, radiance, pdf: light.select_pdf, delta: true, side: light.side }
+    LightSample {
+        direction,
+        distance,
+        radiance,
+        pdf: light.select_pdf,
+        delta: true,
+        side: light.side,
+    }
 }
 
 /// The fall-off that KHR_lights_punctual recommends: the square of a linear ramp between the cosines.
@@ -107,7 +128,14 @@ fn sample_area_light(light: &Light, position: Vec3, u0: f32, u1: f32) -> LightSa
     if pdf <= 0.0 {
         return no_light();
     }
-    LightSample { direction, distance, radiance: xyz(light.radiance), pdf, delta: false, side: light.side }
+    LightSample {
+        direction,
+        distance,
+        radiance: xyz(light.radiance),
+        pdf,
+        delta: false,
+        side: light.side,
+    }
 }
 
 /// Density per solid angle, choice included, of reaching an area light along `direction` at `distance`; 0 from a quad's dark side.

@@ -7,13 +7,16 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::lights::pack_lights;
 use super::materials::{MaterialKey, MaterialTable};
 use super::{
-    FRAME_ALPHA, FRAME_ENV_DRAWN, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL,
-    PackedScene, PixelInfo, Triangle, Vertex,
+    FRAME_ALPHA, FRAME_ENV_DRAWN, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES,
+    NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, Triangle, Vertex,
 };
 use crate::accel::{AccelError, WorldBvh};
 use crate::camera::lens::frame_camera;
 use crate::light::environment::environment_table;
-use crate::scene::{Aperture, EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind, Scene, Side};
+use crate::scene::{
+    Aperture, EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind,
+    Scene, Side,
+};
 
 /// The anchor is kept while the camera stays within this distance of it, as a share of the distance that f32 resolves to 1e-7.
 const ANCHOR_REACH_M: f64 = 1.0;
@@ -80,7 +83,10 @@ impl PackedScene {
         self.frame.spheres[..spheres.len()].copy_from_slice(&spheres);
         self.frame.virtual_node_base = self.real_bvh.gpu_nodes().len() as u32;
         self.frame.virtual_leaf_base = (self.real_bvh.gpu_leaves().len() / 3) as u32;
-        let alpha = self.materials.iter().any(|m| m.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0);
+        let alpha = self
+            .materials
+            .iter()
+            .any(|m| m.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0);
         self.frame.flags = self.frame.flags & !FRAME_ALPHA | if alpha { FRAME_ALPHA } else { 0 };
         pack_lights(self, scene);
         Ok(())
@@ -94,10 +100,24 @@ impl PackedScene {
 
     /// Camera and lens; nothing else depends on them but the pilot.
     pub fn set_camera(&mut self, scene: &Scene) {
-        frame_camera(&scene.camera, &scene.lens, DVec3::from(self.anchor_m), &mut self.frame);
+        frame_camera(
+            &scene.camera,
+            &scene.lens,
+            DVec3::from(self.anchor_m),
+            &mut self.frame,
+        );
         let count = scene.camera.width as usize * scene.camera.height as usize;
-        self.pixels = vec![PixelInfo { difference_probability: 1.0, flags: PIXEL_BEAM_MAY_MEET_VIRTUAL }; count];
-        debug_assert!(matches!(scene.lens.aperture, Aperture::Disc | Aperture::Square | Aperture::Blades(_)));
+        self.pixels = vec![
+            PixelInfo {
+                difference_probability: 1.0,
+                flags: PIXEL_BEAM_MAY_MEET_VIRTUAL
+            };
+            count
+        ];
+        debug_assert!(matches!(
+            scene.lens.aperture,
+            Aperture::Disc | Aperture::Square | Aperture::Blades(_)
+        ));
     }
 
     /// Seed, sampler, estimator, bounces, exposure.
@@ -138,7 +158,11 @@ impl PackedScene {
                 self.frame.env_radiance = [r, g, b, 0.0];
                 self.env_mean_luminance = f64::from(crate::math::luminance(Vec3::new(r, g, b)));
             }
-            EnvironmentMap::LatLong { width, height, texels } => {
+            EnvironmentMap::LatLong {
+                width,
+                height,
+                texels,
+            } => {
                 self.env_texels = texels.iter().flatten().copied().collect();
                 let table = environment_table(*width, *height, &self.env_texels);
                 self.frame.env_width = *width;
@@ -152,17 +176,37 @@ impl PackedScene {
 
     /// Appends the triangles of one side: its objects, then its quad lights.
     fn add_world(&mut self, scene: &Scene, side: Side) -> Result<(), PackError> {
-        for (index, object) in scene.objects.iter().enumerate().filter(|(_, o)| o.side == side) {
+        for (index, object) in scene
+            .objects
+            .iter()
+            .enumerate()
+            .filter(|(_, o)| o.side == side)
+        {
             for instance in &object.instances {
-                let material = self.add_material(&instance.material, object.self_shadow_bias_m, object.albedo_from_photo)?;
+                let material = self.add_material(
+                    &instance.material,
+                    object.self_shadow_bias_m,
+                    object.albedo_from_photo,
+                )?;
                 self.add_instance(&object.world_from_object, instance, material, index as u32);
             }
         }
         for light in scene.lights.iter().filter(|l| l.side == side) {
-            if let LightKind::Quad { corner, edge_u, edge_v, radiance } = light.kind {
+            if let LightKind::Quad {
+                corner,
+                edge_u,
+                edge_v,
+                radiance,
+            } = light.kind
+            {
                 let material = self.materials.len() as u32;
                 self.materials.push(MaterialTable::quad_light(radiance));
-                self.add_quad(DVec3::from(corner), DVec3::from(edge_u), DVec3::from(edge_v), material);
+                self.add_quad(
+                    DVec3::from(corner),
+                    DVec3::from(edge_u),
+                    DVec3::from(edge_v),
+                    material,
+                );
             }
         }
         let limit = (NONE / 8) as usize;
@@ -172,7 +216,12 @@ impl PackedScene {
         Ok(())
     }
 
-    fn add_material(&mut self, material: &Arc<Material>, self_shadow_bias_m: f32, from_photo: bool) -> Result<u32, PackError> {
+    fn add_material(
+        &mut self,
+        material: &Arc<Material>,
+        self_shadow_bias_m: f32,
+        from_photo: bool,
+    ) -> Result<u32, PackError> {
         let key = MaterialKey::new(material, self_shadow_bias_m, from_photo);
         let mut table = std::mem::take(&mut self.material_table);
         let index = table.index_of(self, material, key);
@@ -184,7 +233,13 @@ impl PackedScene {
         Ok(index)
     }
 
-    fn add_instance(&mut self, world_from_object: &DMat4, instance: &Instance, material: u32, object: u32) {
+    fn add_instance(
+        &mut self,
+        world_from_object: &DMat4,
+        instance: &Instance,
+        material: u32,
+        object: u32,
+    ) {
         let world_from_local = *world_from_object * instance.object_from_local;
         let linear = DMat3::from_mat4(world_from_local);
         let mirrored = linear.determinant() < 0.0;
@@ -192,7 +247,11 @@ impl PackedScene {
         let primitive = &instance.primitive;
         let anchor = DVec3::from(self.anchor_m);
         let first_vertex = self.vertices.len() as u32;
-        let direction = |m: &DMat3, v: [f32; 3]| (*m * Vec3::from(v).as_dvec3()).normalize_or_zero().as_vec3();
+        let direction = |m: &DMat3, v: [f32; 3]| {
+            (*m * Vec3::from(v).as_dvec3())
+                .normalize_or_zero()
+                .as_vec3()
+        };
         for (i, position) in primitive.positions.iter().enumerate() {
             let at = world_from_local.transform_point3(Vec3::from(*position).as_dvec3()) - anchor;
             let at = at.as_vec3();
@@ -239,8 +298,19 @@ impl PackedScene {
     /// Triangles that the transform or the rounding made degenerate are left out.
     fn add_triangle(&mut self, vertices: [u32; 3], material: u32, object: u32) {
         let [a, b, c] = vertices.map(|v| self.position(v));
-        if (b - a).as_dvec3().cross((c - a).as_dvec3()).length_squared() > 0.0 {
-            self.triangles.push(Triangle { vertices, material, light: NONE, object, pad: [0; 2] });
+        if (b - a)
+            .as_dvec3()
+            .cross((c - a).as_dvec3())
+            .length_squared()
+            > 0.0
+        {
+            self.triangles.push(Triangle {
+                vertices,
+                material,
+                light: NONE,
+                object,
+                pad: [0; 2],
+            });
         }
     }
 
@@ -251,7 +321,10 @@ impl PackedScene {
     }
 
     fn corners(&self, first_triangle: usize) -> Vec<[Vec3; 3]> {
-        self.triangles[first_triangle..].iter().map(|t| t.vertices.map(|v| self.position(v))).collect()
+        self.triangles[first_triangle..]
+            .iter()
+            .map(|t| t.vertices.map(|v| self.position(v)))
+            .collect()
     }
 }
 
@@ -263,7 +336,11 @@ fn set_rotation(frame: &mut Frame, rotation_deg: f64) {
 
 /// Cofactors instead of the inverse transpose: the same directions up to sign, and defined for flattened objects too.
 fn normal_matrix(linear: &DMat3) -> DMat3 {
-    let sign = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
+    let sign = if linear.determinant() < 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
     let [a, b, c] = [linear.x_axis, linear.y_axis, linear.z_axis];
     DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b)) * sign
 }

@@ -3,16 +3,23 @@
 use glam::{DVec3, Vec2, Vec3};
 
 use super::{
-    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, LIGHT_TRIANGLE, Light, MATERIAL_QUAD_LIGHT, NONE,
-    PackedScene, TEXTURE_UV1,
+    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, LIGHT_TRIANGLE,
+    Light, MATERIAL_QUAD_LIGHT, NONE, PackedScene, TEXTURE_UV1,
 };
 use crate::material::texture_sample;
 use crate::math::luminance;
 use crate::scene::{LightKind, Scene, Side};
 
 /// Barycentric points at which the emission texture of a triangle is looked at.
-const EMISSION_POINTS: [[f32; 2]; 7] =
-    [[1.0 / 3.0, 1.0 / 3.0], [0.6, 0.2], [0.2, 0.6], [0.2, 0.2], [0.05, 0.05], [0.9, 0.05], [0.05, 0.9]];
+const EMISSION_POINTS: [[f32; 2]; 7] = [
+    [1.0 / 3.0, 1.0 / 3.0],
+    [0.6, 0.2],
+    [0.2, 0.6],
+    [0.2, 0.2],
+    [0.05, 0.05],
+    [0.9, 0.05],
+    [0.05, 0.9],
+];
 
 /// Fills `packed.lights`, the triangles' light indices and the frame's light fields.
 pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
@@ -50,13 +57,23 @@ pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
 /// Triangles of the quad lights of one side, two a quad, in the order of the scene's lights.
 fn quad_triangles(packed: &PackedScene, side: u32) -> Vec<usize> {
     let real = packed.frame.real_triangle_count as usize;
-    let range = if side == 0 { 0..real } else { real..packed.triangles.len() };
-    range.filter(|&i| packed.materials[packed.triangles[i].material as usize].flags & MATERIAL_QUAD_LIGHT != 0).collect()
+    let range = if side == 0 {
+        0..real
+    } else {
+        real..packed.triangles.len()
+    };
+    range
+        .filter(|&i| {
+            packed.materials[packed.triangles[i].material as usize].flags & MATERIAL_QUAD_LIGHT != 0
+        })
+        .collect()
 }
 
 /// Radius about the anchor that holds three quarters of the vertices: outliers must not make the environment seem all-important.
 fn scene_radius(packed: &PackedScene) -> f64 {
-    let mut distances: Vec<f32> = (0..packed.vertices.len() as u32).map(|v| packed.position(v).length()).collect();
+    let mut distances: Vec<f32> = (0..packed.vertices.len() as u32)
+        .map(|v| packed.position(v).length())
+        .collect();
     if distances.is_empty() {
         return 1.0;
     }
@@ -88,11 +105,24 @@ fn pack_light(kind: &LightKind, side: u32, anchor: DVec3, radius: f64) -> (Light
     let unit = |d: [f64; 3]| DVec3::from(d).normalize_or_zero().as_vec3();
     let lum = |c: [f32; 3]| f64::from(luminance(Vec3::from(c)));
     match *kind {
-        LightKind::Point { position, intensity } => (
-            Light { position: relative(position), radiance: v4(Vec3::from(intensity), 0.0), ..blank(LIGHT_POINT, side) },
+        LightKind::Point {
+            position,
+            intensity,
+        } => (
+            Light {
+                position: relative(position),
+                radiance: v4(Vec3::from(intensity), 0.0),
+                ..blank(LIGHT_POINT, side)
+            },
             4.0 * PI * lum(intensity),
         ),
-        LightKind::Spot { position, direction, intensity, inner_deg, outer_deg } => {
+        LightKind::Spot {
+            position,
+            direction,
+            intensity,
+            inner_deg,
+            outer_deg,
+        } => {
             let cos = |deg: f64| deg.to_radians().cos();
             (
                 Light {
@@ -105,11 +135,23 @@ fn pack_light(kind: &LightKind, side: u32, anchor: DVec3, radius: f64) -> (Light
                 2.0 * PI * (1.0 - cos(outer_deg)) * lum(intensity),
             )
         }
-        LightKind::Directional { direction, irradiance } => (
-            Light { axis_u: v4(unit(direction), 0.0), radiance: v4(Vec3::from(irradiance), 0.0), ..blank(LIGHT_DIRECTIONAL, side) },
+        LightKind::Directional {
+            direction,
+            irradiance,
+        } => (
+            Light {
+                axis_u: v4(unit(direction), 0.0),
+                radiance: v4(Vec3::from(irradiance), 0.0),
+                ..blank(LIGHT_DIRECTIONAL, side)
+            },
             PI * radius * radius * lum(irradiance),
         ),
-        LightKind::Quad { corner, edge_u, edge_v, radiance } => {
+        LightKind::Quad {
+            corner,
+            edge_u,
+            edge_v,
+            radiance,
+        } => {
             let area = DVec3::from(edge_u).cross(DVec3::from(edge_v)).length();
             (
                 Light {
@@ -125,11 +167,16 @@ fn pack_light(kind: &LightKind, side: u32, anchor: DVec3, radius: f64) -> (Light
     }
 }
 
-fn add_emissive_triangles(packed: &mut PackedScene, lights: &mut Vec<Light>, powers: &mut Vec<f64>) {
+fn add_emissive_triangles(
+    packed: &mut PackedScene,
+    lights: &mut Vec<Light>,
+    powers: &mut Vec<f64>,
+) {
     for id in 0..packed.triangles.len() {
         let triangle = packed.triangles[id];
         let material = &packed.materials[triangle.material as usize];
-        if material.flags & MATERIAL_QUAD_LIGHT != 0 || material.emissive.iter().all(|&c| c <= 0.0) {
+        if material.flags & MATERIAL_QUAD_LIGHT != 0 || material.emissive.iter().all(|&c| c <= 0.0)
+        {
             continue;
         }
         let emission = mean_emission(packed, id);
@@ -148,7 +195,10 @@ fn add_emissive_triangles(packed: &mut PackedScene, lights: &mut Vec<Light>, pow
             axis_v: v4(c - a, 0.0),
             radiance: v4(emission, area as f32),
             triangle: id as u32,
-            ..blank(LIGHT_TRIANGLE, u32::from(id >= packed.frame.real_triangle_count as usize))
+            ..blank(
+                LIGHT_TRIANGLE,
+                u32::from(id >= packed.frame.real_triangle_count as usize),
+            )
         });
         powers.push(power);
     }
@@ -172,7 +222,14 @@ fn mean_emission(packed: &PackedScene, triangle: usize) -> Vec3 {
     });
     let sum: Vec3 = EMISSION_POINTS
         .iter()
-        .map(|&[u, v]| texture_sample(&packed.texels, texture, uvs[0] * (1.0 - u - v) + uvs[1] * u + uvs[2] * v).truncate())
+        .map(|&[u, v]| {
+            texture_sample(
+                &packed.texels,
+                texture,
+                uvs[0] * (1.0 - u - v) + uvs[1] * u + uvs[2] * v,
+            )
+            .truncate()
+        })
         .sum();
     factor * sum / EMISSION_POINTS.len() as f32
 }
@@ -181,11 +238,21 @@ fn mean_emission(packed: &PackedScene, triangle: usize) -> Vec3 {
 fn set_probabilities(lights: &mut [Light], powers: &[f64]) {
     let n = lights.len() as f64;
     let total: f64 = powers.iter().sum();
-    let mut scaled: Vec<f64> = powers.iter().map(|p| if total > 0.0 { 0.5 + 0.5 * n * p / total } else { 1.0 }).collect();
+    let mut scaled: Vec<f64> = powers
+        .iter()
+        .map(|p| {
+            if total > 0.0 {
+                0.5 + 0.5 * n * p / total
+            } else {
+                1.0
+            }
+        })
+        .collect();
     for (light, p) in lights.iter_mut().zip(&scaled) {
         light.select_pdf = (p / n) as f32;
     }
-    let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..lights.len()).partition(|&i| scaled[i] < 1.0);
+    let (mut small, mut large): (Vec<usize>, Vec<usize>) =
+        (0..lights.len()).partition(|&i| scaled[i] < 1.0);
     while let (Some(&s), Some(&l)) = (small.last(), large.last()) {
         small.pop();
         lights[s].alias_threshold = scaled[s] as f32;

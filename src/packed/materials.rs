@@ -4,8 +4,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::{
-    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO, MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED,
-    MATERIAL_THIN_WALLED, MATERIAL_UNLIT, Material, NONE, PackedScene, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1, TEXTURE_WRAP_U_SHIFT,
+    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
+    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, Material, NONE,
+    PackedScene, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1, TEXTURE_WRAP_U_SHIFT,
     TEXTURE_WRAP_V_SHIFT, TextureRef,
 };
 use crate::scene::{self, AlphaMode, Texture, Wrap};
@@ -20,7 +21,11 @@ pub struct MaterialKey {
 
 impl MaterialKey {
     pub fn new(material: &Arc<scene::Material>, self_shadow_bias_m: f32, from_photo: bool) -> Self {
-        Self { material: Arc::as_ptr(material) as usize, self_shadow_bias_bits: self_shadow_bias_m.to_bits(), from_photo }
+        Self {
+            material: Arc::as_ptr(material) as usize,
+            self_shadow_bias_bits: self_shadow_bias_m.to_bits(),
+            from_photo,
+        }
     }
 }
 
@@ -33,7 +38,12 @@ pub struct MaterialTable {
 
 impl MaterialTable {
     /// The packed index of a material, packing it if it is new.
-    pub(super) fn index_of(&mut self, packed: &mut PackedScene, material: &Arc<scene::Material>, key: MaterialKey) -> u32 {
+    pub(super) fn index_of(
+        &mut self,
+        packed: &mut PackedScene,
+        material: &Arc<scene::Material>,
+        key: MaterialKey,
+    ) -> u32 {
         if let Some((_, index)) = self.materials.get(&key) {
             return *index;
         }
@@ -44,7 +54,12 @@ impl MaterialTable {
         index
     }
 
-    fn pack(&mut self, packed: &mut PackedScene, m: &scene::Material, key: &MaterialKey) -> Material {
+    fn pack(
+        &mut self,
+        packed: &mut PackedScene,
+        m: &scene::Material,
+        key: &MaterialKey,
+    ) -> Material {
         let mut slot = |texture: &Option<scene::TextureRef>, srgb: bool| match texture {
             Some(texture) => self.texture(packed, texture, srgb),
             None => NONE,
@@ -87,11 +102,16 @@ impl MaterialTable {
 
     fn texture(&mut self, packed: &mut PackedScene, r: &scene::TextureRef, srgb: bool) -> u32 {
         let texture = &r.texture;
-        let (_, offset) = self.textures.entry(Arc::as_ptr(texture) as usize).or_insert_with(|| {
-            let offset = packed.texels.len() as u32;
-            packed.texels.extend(texture.rgba8.iter().map(|texel| u32::from_le_bytes(*texel)));
-            (texture.clone(), offset)
-        });
+        let (_, offset) = self
+            .textures
+            .entry(Arc::as_ptr(texture) as usize)
+            .or_insert_with(|| {
+                let offset = packed.texels.len() as u32;
+                packed
+                    .texels
+                    .extend(texture.rgba8.iter().map(|texel| u32::from_le_bytes(*texel)));
+                (texture.clone(), offset)
+            });
         let wrap = |w: Wrap| match w {
             Wrap::Repeat => 0,
             Wrap::Mirror => 1,
@@ -150,7 +170,8 @@ impl MaterialTable {
 
 fn flags(m: &scene::Material, record: &Material, from_photo: bool) -> u32 {
     let bit = |on: bool, bit: u32| if on { bit } else { 0 };
-    let lambertian = from_photo || (m.specular == 0.0 && m.metallic == 0.0 && m.transmission == 0.0 && m.clearcoat == 0.0);
+    let lambertian = from_photo
+        || (m.specular == 0.0 && m.metallic == 0.0 && m.transmission == 0.0 && m.clearcoat == 0.0);
     let textures = [
         record.base_color_texture,
         record.metallic_roughness_texture,
@@ -164,7 +185,10 @@ fn flags(m: &scene::Material, record: &Material, from_photo: bool) -> u32 {
         record.clearcoat_normal_texture,
     ];
     bit(lambertian, MATERIAL_LAMBERTIAN)
-        | bit(matches!(m.alpha_mode, AlphaMode::Mask(_)), MATERIAL_ALPHA_MASK)
+        | bit(
+            matches!(m.alpha_mode, AlphaMode::Mask(_)),
+            MATERIAL_ALPHA_MASK,
+        )
         | bit(m.alpha_mode == AlphaMode::Blend, MATERIAL_ALPHA_BLEND)
         | bit(m.unlit, MATERIAL_UNLIT)
         | bit(m.thin_walled, MATERIAL_THIN_WALLED)
@@ -174,5 +198,11 @@ fn flags(m: &scene::Material, record: &Material, from_photo: bool) -> u32 {
 
 /// KHR_materials_volume: white light becomes `color` after `distance_m`. A black channel absorbs within a thousandth of it.
 fn absorption(color: [f32; 3], distance_m: f32) -> [f32; 3] {
-    color.map(|c| if distance_m.is_finite() { -c.max(1e-30).ln() / distance_m.max(1e-30) } else { 0.0 })
+    color.map(|c| {
+        if distance_m.is_finite() {
+            -c.max(1e-30).ln() / distance_m.max(1e-30)
+        } else {
+            0.0
+        }
+    })
 }

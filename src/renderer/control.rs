@@ -69,7 +69,11 @@ pub struct Cancel<'a> {
 
 impl<'a> Cancel<'a> {
     pub fn new(cancelled: &'a (dyn Fn() -> bool + Sync), deadline: Option<Instant>) -> Self {
-        Self { cancelled, deadline, pixels_done: AtomicU64::new(0) }
+        Self {
+            cancelled,
+            deadline,
+            pixels_done: AtomicU64::new(0),
+        }
     }
 
     /// True once the caller wants the render to end or its time is over.

@@ -83,7 +83,12 @@ impl Renderer {
     pub fn new(scene: Scene, options: RendererOptions) -> Result<Self, RenderError> {
         let start = Instant::now();
         let packed = PackedScene::build(&scene)?;
-        let film = Film::new(packed.frame.width, packed.frame.height, 0, options.all_planes);
+        let film = Film::new(
+            packed.frame.width,
+            packed.frame.height,
+            0,
+            options.all_planes,
+        );
         let mut renderer = Self {
             scene,
             packed,
@@ -104,15 +109,24 @@ impl Renderer {
         if self.options.all_planes {
             self.packed.frame.flags |= FRAME_AOVS;
         }
-        let from_photo = self.packed.materials.iter().any(|m| m.flags & MATERIAL_PHOTO_ALBEDO != 0);
+        let from_photo = self
+            .packed
+            .materials
+            .iter()
+            .any(|m| m.flags & MATERIAL_PHOTO_ALBEDO != 0);
         if let Some(photo) = &self.scene.photo {
             if self.scene.settings.exposure == Exposure::Auto {
                 match photo_albedo::fit_exposure_ev(&mut self.packed, photo) {
                     Some(ev) => {
                         self.packed.frame.exposure_scale = ev.exp2() as f32;
-                        self.notes.push(format!("exposure_ev = {ev:.3} fits the proxy's light to the photograph"));
+                        self.notes.push(format!(
+                            "exposure_ev = {ev:.3} fits the proxy's light to the photograph"
+                        ));
                     }
-                    None => self.notes.push("exposure_ev = \"auto\": the camera sees no lit proxy; 0 is used".to_owned()),
+                    None => self.notes.push(
+                        "exposure_ev = \"auto\": the camera sees no lit proxy; 0 is used"
+                            .to_owned(),
+                    ),
                 }
             }
             if from_photo {
@@ -124,7 +138,10 @@ impl Renderer {
 
     /// True if no pixel is within reach of anything virtual: the picture is the photograph.
     fn nothing_to_trace(&self) -> bool {
-        self.packed.pixels.iter().all(|p| p.flags & PIXEL_OUT_OF_REACH != 0)
+        self.packed
+            .pixels
+            .iter()
+            .all(|p| p.flags & PIXEL_OUT_OF_REACH != 0)
     }
 
     /// Renders on until the budget is spent, the scene's rays per pixel are reached or `cancelled` says so; `progress` hears after each pass.
@@ -147,7 +164,9 @@ impl Renderer {
         let pixels = u64::from(self.film.width) * u64::from(self.film.height);
         let before = self.samples();
         let end = match budget {
-            Budget::Rays(rays) => total.min(before + u32::try_from((rays / pixels.max(1)).max(1)).unwrap_or(u32::MAX - before)),
+            Budget::Rays(rays) => total.min(
+                before + u32::try_from((rays / pixels.max(1)).max(1)).unwrap_or(u32::MAX - before),
+            ),
             Budget::Complete | Budget::Time(_) => total,
         };
         let mut done = before;
@@ -159,10 +178,16 @@ impl Renderer {
                 break;
             }
             done += step;
-            progress(Progress { samples: done, samples_total: total, rays: self.rays, elapsed: start.elapsed() });
+            progress(Progress {
+                samples: done,
+                samples_total: total,
+                rays: self.rays,
+                elapsed: start.elapsed(),
+            });
         }
         // Short beside the main passes, and without it edge pixels would not be Eq. 4: not cancelled.
-        let everywhere = self.options.all_planes || self.scene.settings.composite == Composite::Quotient;
+        let everywhere =
+            self.options.all_planes || self.scene.settings.composite == Composite::Quotient;
         self.run_pass(Pass::Real { everywhere }, &Cancel::new(&|| false, None))?;
         self.seconds.render += start.elapsed().as_secs_f64();
         Ok(())
@@ -175,8 +200,16 @@ impl Renderer {
 
     /// Rays per pixel that every pixel within reach has taken.
     pub fn samples(&self) -> u32 {
-        let within_reach = self.film.pixels.iter().zip(&self.packed.pixels).filter(|(_, info)| info.flags & PIXEL_OUT_OF_REACH == 0);
-        within_reach.map(|(sums, _)| sums.n).min().unwrap_or(self.scene.settings.rays_per_pixel)
+        let within_reach = self
+            .film
+            .pixels
+            .iter()
+            .zip(&self.packed.pixels)
+            .filter(|(_, info)| info.flags & PIXEL_OUT_OF_REACH == 0);
+        within_reach
+            .map(|(sums, _)| sums.n)
+            .min()
+            .unwrap_or(self.scene.settings.rays_per_pixel)
     }
 
     pub fn film(&self) -> &Film {
@@ -193,7 +226,11 @@ impl Renderer {
 
     /// The film composited over the photograph.
     pub fn picture(&self) -> Picture {
-        composite(&self.film, self.scene.photo.as_ref(), self.scene.settings.composite)
+        composite(
+            &self.film,
+            self.scene.photo.as_ref(),
+            self.scene.settings.composite,
+        )
     }
 
     pub fn planes(&self) -> Planes {

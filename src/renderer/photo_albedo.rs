@@ -38,12 +38,20 @@ struct Seen {
 /// Fills `scene.photo_albedo` and its median so that the converged Ir reproduces the photograph.
 pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo) {
     let seen = first_surfaces(scene, |flags| flags & MATERIAL_PHOTO_ALBEDO != 0);
-    scene.photo_albedo = seen.iter().map(|s| [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, s.depth_m]).collect();
+    scene.photo_albedo = seen
+        .iter()
+        .map(|s| [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, s.depth_m])
+        .collect();
     scene.frame.photo_albedo_median = [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, 0.0];
     let scale = scene.frame.exposure_scale;
     for _ in 0..ROUNDS {
         let light = light_on_surfaces(scene, &seen);
-        for ((entry, s), (light, ic)) in scene.photo_albedo.iter_mut().zip(&seen).zip(light.iter().zip(&photo.linear)) {
+        for ((entry, s), (light, ic)) in scene
+            .photo_albedo
+            .iter_mut()
+            .zip(&seen)
+            .zip(light.iter().zip(&photo.linear))
+        {
             if s.depth_m > 0.0 {
                 for c in 0..3 {
                     entry[c] = (ic[c] / (light[c] * scale).max(1e-12)).clamp(0.0, MAX_ALBEDO);
@@ -80,12 +88,18 @@ pub fn fit_exposure_ev(scene: &mut PackedScene, photo: &Photo) -> Option<f64> {
 }
 
 fn first_surfaces(scene: &PackedScene, wanted: impl Fn(u32) -> bool + Sync) -> Vec<Seen> {
-    let pinhole = Frame { aperture_radius: 0.0, ..scene.frame };
+    let pinhole = Frame {
+        aperture_radius: 0.0,
+        ..scene.frame
+    };
     let back = Vec3::from_slice(&scene.frame.camera_back[..3]);
     (0..scene.frame.width * scene.frame.height)
         .into_par_iter()
         .map(|pixel| {
-            let (x, y) = ((pixel % pinhole.width) as f32 + 0.5, (pixel / pinhole.width) as f32 + 0.5);
+            let (x, y) = (
+                (pixel % pinhole.width) as f32 + 0.5,
+                (pixel / pinhole.width) as f32 + 0.5,
+            );
             let ray = camera_ray(&pinhole, x, y, 0.5, 0.5);
             let hit = scene.real_bvh.closest(&Ray {
                 origin: ray.origin,
@@ -95,9 +109,15 @@ fn first_surfaces(scene: &PackedScene, wanted: impl Fn(u32) -> bool + Sync) -> V
                 skip: NONE,
             });
             if hit.triangle == NONE || !wanted(material_flags(scene, hit)) {
-                return Seen { depth_m: 0.0, normal: Vec3::ZERO };
+                return Seen {
+                    depth_m: 0.0,
+                    normal: Vec3::ZERO,
+                };
             }
-            Seen { depth_m: hit.t * -ray.direction.dot(back), normal: interpolated_normal(scene, hit) }
+            Seen {
+                depth_m: hit.t * -ray.direction.dot(back),
+                normal: interpolated_normal(scene, hit),
+            }
         })
         .collect()
 }
@@ -107,7 +127,9 @@ fn material_flags(scene: &PackedScene, hit: Hit) -> u32 {
 }
 
 fn interpolated_normal(scene: &PackedScene, hit: Hit) -> Vec3 {
-    let [a, b, c] = scene.triangles[hit.triangle as usize].vertices.map(|v| Vec3::from_slice(&scene.vertices[v as usize].normal_v0[..3]));
+    let [a, b, c] = scene.triangles[hit.triangle as usize]
+        .vertices
+        .map(|v| Vec3::from_slice(&scene.vertices[v as usize].normal_v0[..3]));
     (a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v).normalize_or_zero()
 }
 
@@ -134,7 +156,10 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen]) -> Grid {
     scene.frame.rays_total = GRID_RAYS;
     scene.frame.estimator = ESTIMATOR_DIRECT;
     let (frame_width, frame_height) = (kept.width as usize, kept.height as usize);
-    let (width, height) = (frame_width.div_ceil(GRID_PITCH_PX), frame_height.div_ceil(GRID_PITCH_PX));
+    let (width, height) = (
+        frame_width.div_ceil(GRID_PITCH_PX),
+        frame_height.div_ceil(GRID_PITCH_PX),
+    );
     let shared: &PackedScene = scene;
     let points = (0..width * height)
         .into_par_iter()
@@ -152,11 +177,20 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen]) -> Grid {
                 albedo += a;
             }
             let n = GRID_RAYS as f32;
-            Some(GridPoint { x, y, radiance: radiance / n, light: radiance / albedo.max(Vec3::splat(1e-6)) })
+            Some(GridPoint {
+                x,
+                y,
+                radiance: radiance / n,
+                light: radiance / albedo.max(Vec3::splat(1e-6)),
+            })
         })
         .collect();
     scene.frame = kept;
-    Grid { width, height, points }
+    Grid {
+        width,
+        height,
+        points,
+    }
 }
 
 /// E / pi of every pixel with a wanted surface: the grid's estimates, weighted by distance, depth and normal.
@@ -178,11 +212,15 @@ fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen]) -> Vec<Vec3> {
                     if cx < 0 || cy < 0 || cx >= grid.width as isize || cy >= grid.height as isize {
                         continue;
                     }
-                    let Some(point) = &grid.points[cy as usize * grid.width + cx as usize] else { continue };
+                    let Some(point) = &grid.points[cy as usize * grid.width + cx as usize] else {
+                        continue;
+                    };
                     let there = &seen[point.y * width + point.x];
-                    let away = (point.x as f32 - x as f32).powi(2) + (point.y as f32 - y as f32).powi(2);
+                    let away =
+                        (point.x as f32 - x as f32).powi(2) + (point.y as f32 - y as f32).powi(2);
                     let pitch = GRID_PITCH_PX as f32;
-                    let depth_step = (there.depth_m - s.depth_m) / (s.depth_m * DEPTH_TOLERANCE * (1.0 + away.sqrt() / pitch));
+                    let depth_step = (there.depth_m - s.depth_m)
+                        / (s.depth_m * DEPTH_TOLERANCE * (1.0 + away.sqrt() / pitch));
                     let weight = (-away / (2.0 * pitch * pitch)).exp()
                         * (-depth_step * depth_step).exp()
                         * there.normal.dot(s.normal).max(0.0).powi(NORMAL_POWER);
@@ -192,7 +230,11 @@ fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen]) -> Vec<Vec3> {
                     weights += weight;
                 }
             }
-            if weights > 0.0 { sum / weights } else { Vec3::ZERO }
+            if weights > 0.0 {
+                sum / weights
+            } else {
+                Vec3::ZERO
+            }
         })
         .collect()
 }
@@ -201,7 +243,11 @@ fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen]) -> Vec<Vec3> {
 fn median(entries: &[[f32; 4]]) -> [f32; 4] {
     let mut result = [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, 0.0];
     for (c, result) in result.iter_mut().enumerate().take(3) {
-        let mut values: Vec<f32> = entries.iter().filter(|e| e[3] > 0.0).map(|e| e[c]).collect();
+        let mut values: Vec<f32> = entries
+            .iter()
+            .filter(|e| e[3] > 0.0)
+            .map(|e| e[c])
+            .collect();
         if !values.is_empty() {
             let middle = values.len() / 2;
             *result = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
