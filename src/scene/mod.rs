@@ -15,8 +15,10 @@ mod object;
 mod photo;
 mod pose;
 mod reader;
+mod scan;
 mod settings;
 mod shape;
+pub mod smooth;
 pub mod srgb;
 #[cfg(test)]
 mod tests;

@@ -33,6 +33,7 @@ pub struct GltfScene {
     pub lights: Vec<PlacedLight>,
     /// At least one drawn primitive names a material of its own; the others have glTF's default (white rough metal).
     pub has_materials: bool,
+    /// One line each; the caller adds the file's name.
     pub warnings: Vec<String>,
 }
 
@@ -197,7 +198,7 @@ fn load(path: &Path) -> Result<GltfScene, Problem> {
     if scene.instances.is_empty() && scene.lights.is_empty() {
         notes.plain("the file draws nothing".into());
     }
-    scene.warnings = notes.lines(path);
+    scene.warnings = notes.lines();
     Ok(scene)
 }
 
@@ -456,7 +457,7 @@ impl Notes {
         }
     }
 
-    fn lines(self, path: &Path) -> Vec<String> {
+    fn lines(self) -> Vec<String> {
         let counted = self
             .counted
             .into_iter()
@@ -494,7 +495,6 @@ impl Notes {
         counted
             .chain(self.plain)
             .map(|line| {
-                let line = format!("{}: {line}", path.display());
                 line.chars()
                     .map(|c| if c.is_control() { ' ' } else { c })
                     .collect()
