@@ -14,14 +14,8 @@ pub const MODULES: &[(&str, &str)] = &[
     ("bindings", include_str!("../../shaders/bindings.wgsl")),
     ("bsdf", include_str!("../../shaders/bsdf.wgsl")),
     ("cones", include_str!("../../shaders/cones.wgsl")),
-    (
-        "contribution",
-        include_str!("../../shaders/contribution.wgsl"),
-    ),
-    (
-        "environment",
-        include_str!("../../shaders/environment.wgsl"),
-    ),
+    ("contribution", include_str!("../../shaders/contribution.wgsl")),
+    ("environment", include_str!("../../shaders/environment.wgsl")),
     ("estimator", include_str!("../../shaders/estimator.wgsl")),
     ("film", include_str!("../../shaders/film.wgsl")),
     ("fresnel", include_str!("../../shaders/fresnel.wgsl")),
@@ -214,8 +208,17 @@ impl Composer {
         compiler
             .compile(&path(root)?)
             .map(|result| result.to_string())
-            .map_err(|error| shader_error(error.to_string()))
+            .map_err(|error| shader_error(without_colours(&error.to_string())))
     }
+}
+
+/// WESL paints its messages whether or not they go to a terminal.
+fn without_colours(text: &str) -> String {
+    let mut pieces = text.split("\u{1b}[");
+    let first = pieces.next().unwrap_or_default().to_owned();
+    pieces.fold(first, |plain, piece| {
+        plain + piece.split_once('m').map_or("", |(_, rest)| rest)
+    })
 }
 
 #[cfg(test)]
@@ -289,6 +292,10 @@ fn unused() -> u32 { return lights[0].kind; }
                 "@if(lense) const x = 1; @compute @workgroup_size(1) fn main() { }",
             )
             .compose("root", "main", &Features::default());
-        assert!(composed.is_err_and(|error| error.to_string().contains("lense")));
+        let message = composed.expect_err("refused").to_string();
+        assert!(
+            message.contains("lense") && !message.contains('\u{1b}'),
+            "{message}"
+        );
     }
 }
