@@ -394,7 +394,9 @@ fn moved(triangles: &[[Vec3; 3]], by: Vec3) -> Vec<[Vec3; 3]> {
 #[test]
 fn spheres_cover_tightly_and_are_few() {
     let ball = sphere(30, 60, 1.0);
-    let one = WorldBvh::build(&ball, 0).expect("builds").bounding_spheres(16);
+    let one = WorldBvh::build(&ball, 0)
+        .expect("builds")
+        .bounding_spheres(16);
     assert_eq!(one.len(), 1, "{one:?}");
     assert!(one[0][3] < 1.00001, "{one:?}");
     assert!(covered(&ball, &one));
@@ -415,7 +417,9 @@ fn spheres_cover_tightly_and_are_few() {
 
     for (seed, scale) in [(1, 1e-4), (2, 1.0), (3, 1e6)] {
         let mesh = scaled(slivers(2000, seed), scale);
-        let cover = WorldBvh::build(&mesh, 0).expect("builds").bounding_spheres(16);
+        let cover = WorldBvh::build(&mesh, 0)
+            .expect("builds")
+            .bounding_spheres(16);
         assert!(covered(&mesh, &cover), "{cover:?}");
     }
 }
