@@ -129,7 +129,7 @@ fn vertex(block: &TriangleBlock, lanes: &Lanes, index: usize) -> [__m256; 3] {
 
 #[inline]
 #[target_feature(enable = "avx2,fma,bmi1,lzcnt,popcnt")]
-fn block(block: &TriangleBlock, lanes: &Lanes, limit: f32) -> (u32, Eight) {
+fn block(block: &TriangleBlock, lanes: &Lanes, limit: f32) -> (u32, [Eight; 3]) {
     let [ax, ay, az] = vertex(block, lanes, 0);
     let [bx, by, bz] = vertex(block, lanes, 1);
     let [cx, cy, cz] = vertex(block, lanes, 2);
@@ -145,12 +145,14 @@ fn block(block: &TriangleBlock, lanes: &Lanes, limit: f32) -> (u32, Eight) {
     );
     let inside = _mm256_and_ps(inside, _mm256_cmp_ps::<_CMP_NEQ_UQ>(det, zero));
     if _mm256_movemask_ps(inside) == 0 {
-        return (0, Eight([0.0; 8]));
+        return (0, [Eight([0.0; 8]); 3]);
     }
     let inv_det = _mm256_div_ps(_mm256_set1_ps(1.0), det);
+    let second = _mm256_mul_ps(v, inv_det);
+    let third = _mm256_mul_ps(w, inv_det);
     let a_part = _mm256_mul_ps(_mm256_mul_ps(u, inv_det), az);
-    let b_part = _mm256_mul_ps(_mm256_mul_ps(v, inv_det), bz);
-    let c_part = _mm256_mul_ps(_mm256_mul_ps(w, inv_det), cz);
+    let b_part = _mm256_mul_ps(second, bz);
+    let c_part = _mm256_mul_ps(third, cz);
     let t = _mm256_mul_ps(
         _mm256_add_ps(_mm256_add_ps(a_part, b_part), c_part),
         lanes.shear[2],
@@ -161,7 +163,7 @@ fn block(block: &TriangleBlock, lanes: &Lanes, limit: f32) -> (u32, Eight) {
     );
     let hit = _mm256_and_ps(inside, within);
     if _mm256_movemask_ps(hit) == 0 {
-        return (0, Eight([0.0; 8]));
+        return (0, [Eight([0.0; 8]); 3]);
     }
     let sign = _mm256_set1_ps(-0.0);
     let size = |value: __m256| _mm256_andnot_ps(sign, value);
@@ -184,7 +186,10 @@ fn block(block: &TriangleBlock, lanes: &Lanes, limit: f32) -> (u32, Eight) {
         ),
     );
     let mask = _mm256_movemask_ps(_mm256_and_ps(hit, bounded));
-    (mask as u32, bytemuck::cast(t))
+    (
+        mask as u32,
+        [t, second, third].map(|row| bytemuck::cast(row)),
+    )
 }
 
 /// Asks for the cache lines of a node or of a leaf's first block.

@@ -4,7 +4,6 @@ use std::cell::RefCell;
 
 use super::wide::{Eight, MAX_LEVELS, TriangleBlock, WideBvh, WideNode};
 use super::{Hit, Ray};
-use crate::packed::NONE;
 
 /// Factor by which a box may be farther than a hit: 16 units of rounding (see the module's proof).
 pub(super) const BOX_MARGIN: f32 = 1.0 + 1.0 / (1 << 20) as f32;
@@ -70,16 +69,17 @@ impl RayFrame {
             return None;
         }
         let axes = [(largest + 1) % 3, (largest + 2) % 3, largest];
-        let along = direction[largest];
+        let inv_direction = direction.map(|d| 1.0 / d);
+        let scale = inv_direction[largest];
         Some(RayFrame {
             origin,
-            inv_direction: direction.map(|d| 1.0 / d),
+            inv_direction,
             near_side: direction.map(|d| usize::from(d < 0.0)),
             axes,
             shear: [
-                direction[axes[0]] / along,
-                direction[axes[1]] / along,
-                1.0 / along,
+                direction[axes[0]] * scale,
+                direction[axes[1]] * scale,
+                scale,
             ],
             // Without a sign, so that the bits of distances sort as they do.
             t_min: ray.t_min + 0.0,
@@ -93,9 +93,10 @@ impl RayFrame {
 #[derive(Clone, Copy)]
 pub(super) struct Found {
     pub(super) t: f32,
+    /// Weights of the second and third vertex.
+    pub(super) weights: [f32; 2],
     pub(super) id: u32,
-    /// Block << 3 | lane, [`NONE`] for none.
-    pub(super) place: u32,
+    pub(super) any: bool,
 }
 
 impl Found {
@@ -104,7 +105,8 @@ impl Found {
             t: frame.t_max,
             // No id is smaller: a hit at exactly t_max is not accepted.
             id: 0,
-            place: NONE,
+            weights: [0.0; 2],
+            any: false,
         }
     }
 
@@ -126,7 +128,7 @@ thread_local! {
 /// Defines a traversal `fn NAME<const ANY: bool>(&WideBvh, &RayFrame, Found, &mut Stack) -> Found`.
 ///
 /// `$boxes(node, lanes, limit)` returns the mask of children entered before `limit` and their distances; `$block(block, lanes, limit)` the
-/// mask of triangles hit in [t_min, limit] and their distances; `$lanes` makes the vector form of a ray; `$prefetch(tree, child)` may
+/// mask of triangles hit in [t_min, limit], their distances and the weights of their second and third vertices; `$lanes` makes the vector form of a ray; `$prefetch(tree, child)` may
 /// fetch a child that waits.
 macro_rules! traversal {
     ($(#[$attribute:meta])* fn $name:ident($lanes:path, $boxes:path, $block:path, $prefetch:path)) => {
@@ -173,7 +175,7 @@ macro_rules! traversal {
                     let first = (child & !LEAF) >> 3;
                     for block_index in first..first + (child & 7) + 1 {
                         let block = &tree.blocks[block_index as usize];
-                        let (mut mask, distances) = $block(block, &lanes, found.t);
+                        let (mut mask, [distances, second, third]) = $block(block, &lanes, found.t);
                         while mask != 0 {
                             let lane = mask.trailing_zeros() as usize & 7;
                             mask &= mask - 1;
@@ -181,7 +183,8 @@ macro_rules! traversal {
                             if found.accepts(frame, t, id) {
                                 found.t = t;
                                 found.id = id;
-                                found.place = block_index << 3 | lane as u32;
+                                found.weights = [second.0[lane], third.0[lane]];
+                                found.any = true;
                                 if ANY {
                                     return found;
                                 }
@@ -221,24 +224,19 @@ pub(super) fn closest(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> Hit {
         return Hit::MISS;
     };
     let found = traverse::<false>(tree, kernel, &frame);
-    if found.place == NONE {
+    if !found.any {
         return Hit::MISS;
     }
-    let block = &tree.blocks[(found.place >> 3) as usize];
-    let projected = project(block, &frame, (found.place & 7) as usize);
     Hit {
         t: found.t,
-        u: projected.weights[1],
-        v: projected.weights[2],
+        u: found.weights[0],
+        v: found.weights[1],
         triangle: found.id,
     }
 }
 
 pub(super) fn any(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> bool {
-    RayFrame::new(ray).is_some_and(|frame| {
-        let found = traverse::<true>(tree, kernel, &frame);
-        found.place != NONE
-    })
+    RayFrame::new(ray).is_some_and(|frame| traverse::<true>(tree, kernel, &frame).any)
 }
 
 /// One triangle seen along the ray.
@@ -333,14 +331,16 @@ fn portable_boxes(node: &WideNode, frame: &&RayFrame, limit: f32) -> (u32, Eight
 }
 
 #[inline(always)]
-fn portable_block(block: &TriangleBlock, frame: &&RayFrame, limit: f32) -> (u32, Eight) {
+fn portable_block(block: &TriangleBlock, frame: &&RayFrame, limit: f32) -> (u32, [Eight; 3]) {
     let mut mask = 0;
-    let mut distances = [0.0; 8];
+    let mut results = [Eight([0.0; 8]); 3];
     for lane in 0..8 {
         let projected = project(block, frame, lane);
         let within = projected.t >= frame.t_min && projected.t <= limit;
         mask |= u32::from(projected.hit && within) << lane;
-        distances[lane] = projected.t;
+        results[0].0[lane] = projected.t;
+        results[1].0[lane] = projected.weights[1];
+        results[2].0[lane] = projected.weights[2];
     }
-    (mask, Eight(distances))
+    (mask, results)
 }
