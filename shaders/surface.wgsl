@@ -117,7 +117,7 @@ fn photo_albedo_at(position: vec3<f32>) -> vec3<f32> {
     let median = frame.photo_albedo_median.xyz;
     let offset = position - frame.camera_position.xyz;
     let depth = -dot3(offset, frame.camera_back.xyz);
-    if !(depth > 0.0) {
+    if depth <= 0.0 {
         return median;
     }
     let x = dot3(offset, frame.camera_right.xyz) / depth;
