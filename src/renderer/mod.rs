@@ -106,7 +106,8 @@ impl Renderer {
             seconds: Seconds::default(),
             notes: Vec::new(),
         };
-        renderer.prepare();
+        renderer.prepare_photo();
+        renderer.packed.pixels = cpu::pilot(&renderer.packed);
         renderer.seconds.build = start.elapsed().as_secs_f64();
         let start = Instant::now();
         renderer.backend = renderer.open_backend()?;
@@ -135,8 +136,8 @@ impl Renderer {
         }
     }
 
-    /// What follows from the packed scene: exposure, albedo from the photograph, the pilot.
-    fn prepare(&mut self) {
+    /// What follows from the real world and its light: exposure, and albedo from the photograph.
+    fn prepare_photo(&mut self) {
         if self.options.all_planes {
             self.packed.frame.flags |= FRAME_AOVS;
         }
@@ -164,7 +165,6 @@ impl Renderer {
                 photo_albedo::estimate_photo_albedo(&mut self.packed, photo);
             }
         }
-        self.packed.pixels = cpu::pilot(&self.packed);
     }
 
     /// True if no pixel is within reach of anything virtual: the picture is the photograph.
@@ -231,7 +231,7 @@ impl Renderer {
     pub fn set_lens(&mut self, lens: Lens) -> Result<(), RenderError> {
         self.scene.lens = lens;
         self.packed.set_camera(&self.scene);
-        self.restart()
+        self.restart(false)
     }
 
     /// Another camera pose. While it stays near the anchor nothing is rebuilt but the pilot.
@@ -245,7 +245,7 @@ impl Renderer {
         } else {
             self.packed = PackedScene::build(&self.scene)?;
         }
-        self.restart()
+        self.restart(true)
     }
 
     /// Moves an object of the scene. A virtual one costs the virtual BVH, a real one everything.
@@ -263,11 +263,12 @@ impl Renderer {
             .get_mut(object)
             .ok_or(RenderError::NoSuchObject(object))?;
         entry.world_from_object = world_from_object;
+        let real = entry.side == Side::Real;
         match entry.side {
             Side::Virtual => self.packed.rebuild_virtual(&self.scene)?,
             Side::Real => self.packed = PackedScene::build(&self.scene)?,
         }
-        self.restart()
+        self.restart(real)
     }
 
     /// Other lights. Real quads are part of the real world, so where they change it is built anew.
@@ -289,13 +290,16 @@ impl Renderer {
         } else {
             self.packed.rebuild_virtual(&self.scene)?;
         }
-        self.restart()
+        self.restart(true)
     }
 
     /// Takes up the packed scene after an edit.
-    fn restart(&mut self) -> Result<(), RenderError> {
+    fn restart(&mut self, real_light_changed: bool) -> Result<(), RenderError> {
         let start = Instant::now();
-        self.prepare();
+        if real_light_changed {
+            self.prepare_photo();
+        }
+        self.packed.pixels = cpu::pilot(&self.packed);
         self.film = Film::new(
             self.film.width,
             self.film.height,
