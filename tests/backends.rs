@@ -67,7 +67,7 @@ fn renderer(settings: &str, parts: &[&str]) -> Renderer {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("scene.toml");
     let text = format!(
-        "{CAMERA}{}\n[render]\nrays_per_pixel = 8\n{settings}\n",
+        "{CAMERA}{}\n[render]\nrays_per_pixel = 8\nbackend = \"cpu\"\n{settings}\n",
         parts.concat()
     );
     std::fs::write(&path, text).expect("writes");
