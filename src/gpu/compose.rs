@@ -28,6 +28,7 @@ pub const MODULES: &[(&str, &str)] = &[
     ("lens", include_str!("../../shaders/lens.wgsl")),
     ("lights", include_str!("../../shaders/lights.wgsl")),
     ("math", include_str!("../../shaders/math.wgsl")),
+    ("rectangle", include_str!("../../shaders/rectangle.wgsl")),
     ("request", include_str!("../../shaders/request.wgsl")),
     ("sampler", include_str!("../../shaders/sampler.wgsl")),
     ("state", include_str!("../../shaders/state.wgsl")),
