@@ -94,6 +94,7 @@ fn surface_alpha(hit: Hit) -> f32 {
     return 1.0;
 }
 
+@if(area_lights)
 fn triangle_emission(triangle: u32, u: f32, v: f32) -> vec3<f32> {
     let entry = materials[triangles[triangle].material];
     var emission = entry.emissive;
@@ -116,7 +117,7 @@ fn photo_albedo_at(position: vec3<f32>) -> vec3<f32> {
     let median = frame.photo_albedo_median.xyz;
     let offset = position - frame.camera_position.xyz;
     let depth = -dot3(offset, frame.camera_back.xyz);
-    if !(depth > 0.0) {
+    if depth <= 0.0 {
         return median;
     }
     let x = dot3(offset, frame.camera_right.xyz) / depth;
@@ -228,7 +229,10 @@ fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
         }
     }
     var base_color = clamp(base.xyz, vec3<f32>(0.0), vec3<f32>(1.0));
-    let coverage = coverage_of(entry, base.w);
+    var coverage = 1.0;
+    @if(alpha) {
+        coverage = coverage_of(entry, base.w);
+    }
     var flags = entry.flags;
     @if(photo_albedo) {
         if (flags & MATERIAL_PHOTO_ALBEDO) != 0u {

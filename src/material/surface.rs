@@ -154,7 +154,7 @@ fn photo_albedo_at(scene: &PackedScene, position: Vec3) -> Vec3 {
     let median = Vec4::from(frame.photo_albedo_median).truncate();
     let offset = position - Vec4::from(frame.camera_position).truncate();
     let depth = -offset.dot(Vec4::from(frame.camera_back).truncate());
-    if !(depth > 0.0) {
+    if depth <= 0.0 {
         return median;
     }
     // OpenCV axes: y down. The lens distortion maps ideal to photograph coordinates.
