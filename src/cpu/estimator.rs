@@ -62,17 +62,8 @@ pub fn advance(scene: &PackedScene, st: &mut PathState) {
         STAGE_PATH => goes_on = path_hit(scene, st),
         STAGE_PATH_SHADOW => path_shadow(scene, st),
         STAGE_PAPER_BEHIND => paper_behind(scene, st),
-        STAGE_DIFFERENCE_SHADOW => {
-            if shadow_counts(st) {
-                st.radiance += st.shadow_contribution;
-            }
-        }
-        STAGE_DIFFERENCE_CONE => {
-            // Counts only where virtual geometry is nearer.
-            if virtual_is_nearer(st.hit_virtual, st.hit_real) {
-                split_difference(scene, st);
-            }
-        }
+        STAGE_DIFFERENCE_SHADOW => difference_shadow(st),
+        STAGE_DIFFERENCE_CONE => difference_cone(scene, st),
         STAGE_DIFFERENCE_BSDF => difference_bsdf(scene, st),
         STAGE_REAL_PASS => real_pass(scene, st),
         _ => {}
@@ -176,6 +167,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.direction = st.next_direction;
             st.density = st.next_density;
             st.throughput = st.next_throughput;
+            st.indirect = st.indirect || st.density != DELTA_DENSITY;
             st.t_max = f32::INFINITY;
             if st.mode == MODE_DIFFERENCE {
                 st.stage = STAGE_DIFFERENCE_CONE;
@@ -198,6 +190,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.direction = st.real_direction;
             st.density = st.real_density;
             st.throughput = st.real_throughput;
+            st.indirect = st.indirect || st.density != DELTA_DENSITY;
             plan_vertex(st, st.real_hit);
             continue;
         }
@@ -212,6 +205,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.direction = st.difference_direction;
             st.density = st.difference_density;
             st.throughput = st.difference_throughput;
+            st.indirect = true;
             st.depth = st.difference_depth;
             st.t_max = f32::INFINITY;
             st.stage = STAGE_DIFFERENCE_BSDF;
@@ -303,13 +297,19 @@ fn path_shadow(scene: &PackedScene, st: &mut PathState) {
 }
 
 /// A difference shadow ray contributes where only something virtual blocks a real light, or where nothing blocks a virtual one.
-fn shadow_counts(st: &PathState) -> bool {
+fn difference_shadow(st: &mut PathState) {
     let open_real = st.hit_real.triangle == NONE;
     let open_virtual = st.hit_virtual.triangle == NONE;
-    if st.shadow_request == REQUEST_SHADOW_DIFFERENCE {
-        !open_virtual && open_real
-    } else {
-        open_virtual && open_real
+    let blocked_alone = st.shadow_request == REQUEST_SHADOW_DIFFERENCE;
+    if open_real && open_virtual != blocked_alone {
+        st.radiance += st.shadow_contribution;
+    }
+}
+
+/// A direction inside the cones counts only where virtual geometry is nearer.
+fn difference_cone(scene: &PackedScene, st: &mut PathState) {
+    if virtual_is_nearer(st.hit_virtual, st.hit_real) {
+        split_difference(scene, st);
     }
 }
 

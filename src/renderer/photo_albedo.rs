@@ -20,8 +20,8 @@ const MAX_ALBEDO: f32 = 0.98;
 const FIRST_ALBEDO: f32 = 0.5;
 /// Grid pitch of the irradiance estimate in pixels, and its rays per grid point.
 const GRID_PITCH_PX: usize = 4;
-const GRID_RAYS: u32 = 64;
-const ROUNDS: usize = 3;
+const GRID_RAYS: u32 = 32;
+const ROUNDS: usize = 2;
 /// Half-width of the spreading filter in grid points; relative depth and normal tolerances.
 const FILTER_RADIUS: isize = 3;
 const DEPTH_TOLERANCE: f32 = 0.02;
@@ -65,8 +65,9 @@ pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo) {
 /// log2 of the factor that fits the real radiance to the photograph over the proxy: the median of Ic / Ir in luminance.
 pub fn fit_exposure_ev(scene: &mut PackedScene, photo: &Photo) -> Option<f64> {
     let seen = first_surfaces(scene, |_| true);
-    let first = [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, 0.0];
-    scene.frame.photo_albedo_median = first;
+    // Nothing is known of the albedo yet: every point takes the median.
+    scene.photo_albedo = vec![[0.0; 4]; seen.len()];
+    scene.frame.photo_albedo_median = [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, 0.0];
     let grid = trace_grid(scene, &seen);
     let width = scene.frame.width as usize;
     let mut ratios: Vec<f64> = grid
