@@ -217,14 +217,14 @@ fn write_proxy(folder: &Path) -> std::io::Result<()> {
 fn write_virtual(folder: &Path) -> std::io::Result<()> {
     let gold = json!({
         "name": "gold",
-        "pbrMetallicRoughness": { "baseColorFactor": [1.0, 0.75, 0.33, 1.0], "metallicFactor": 1.0, "roughnessFactor": 0.14 },
+        "pbrMetallicRoughness": { "baseColorFactor": [1.0, 0.75, 0.33, 1.0], "metallicFactor": 1.0, "roughnessFactor": 0.24 },
     });
     let knot = trefoil(0.062, 180, 20);
     glb::write(&folder.join("knot.glb"), &[(&knot, Some(gold))])?;
     let lacquer = json!({
         "name": "lacquer",
         "pbrMetallicRoughness": { "baseColorFactor": [0.03, 0.10, 0.36, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.5 },
-        "extensions": { "KHR_materials_clearcoat": { "clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.05 } },
+        "extensions": { "KHR_materials_clearcoat": { "clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.15 } },
     });
     glb::write(&folder.join("pawn.glb"), &[(&pawn(), Some(lacquer))])
 }
