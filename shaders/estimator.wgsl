@@ -57,14 +57,14 @@ fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
 fn advance(st: ptr<function, PathState>) {
     var goes_on = true;
     switch (*st).stage {
-        case STAGE_PRIMARY_VIRTUAL: { goes_on = primary_virtual(st); }
-        case STAGE_PRIMARY_REAL: { primary_real(st); }
+        @if(!paper) case STAGE_PRIMARY_VIRTUAL: { goes_on = primary_virtual(st); }
+        @if(!paper) case STAGE_PRIMARY_REAL: { primary_real(st); }
         case STAGE_PATH: { goes_on = path_hit(st); }
         case STAGE_PATH_SHADOW: { path_shadow(st); }
-        case STAGE_PAPER_BEHIND: { paper_behind(st); }
-        case STAGE_DIFFERENCE_SHADOW: { difference_shadow(st); }
-        case STAGE_DIFFERENCE_CONE: { difference_cone(st); }
-        case STAGE_DIFFERENCE_BSDF: { difference_bsdf(st); }
+        @if(paper) case STAGE_PAPER_BEHIND: { paper_behind(st); }
+        @if(!paper) case STAGE_DIFFERENCE_SHADOW: { difference_shadow(st); }
+        @if(!paper) case STAGE_DIFFERENCE_CONE: { difference_cone(st); }
+        @if(!paper) case STAGE_DIFFERENCE_BSDF: { difference_bsdf(st); }
         case STAGE_REAL_PASS: { real_pass(st); }
         default: {}
     }
@@ -175,23 +175,25 @@ fn resume(st: ptr<function, PathState>) {
             plan_vertex(st, (*st).real_hit);
             continue;
         }
-        if ((*st).pending & PENDING_DIFFERENCE) != 0u {
-            (*st).pending &= ~PENDING_DIFFERENCE;
-            (*st).mode = MODE_DIFFERENCE;
-            (*st).medium = NONE;
-            (*st).position = (*st).difference_position;
-            (*st).offset = (*st).difference_offset;
-            (*st).side = 0u;
-            (*st).real_t_min = (*st).difference_t_min;
-            (*st).direction = (*st).difference_direction;
-            (*st).density = (*st).difference_density;
-            (*st).throughput = (*st).difference_throughput;
-            (*st).indirect = 1u;
-            (*st).depth = (*st).difference_depth;
-            (*st).t_max = FAR;
-            (*st).stage = STAGE_DIFFERENCE_BSDF;
-            (*st).request = select(REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, (*st).difference_lambertian != 0u);
-            return;
+        @if(!paper) {
+            if ((*st).pending & PENDING_DIFFERENCE) != 0u {
+                (*st).pending &= ~PENDING_DIFFERENCE;
+                (*st).mode = MODE_DIFFERENCE;
+                (*st).medium = NONE;
+                (*st).position = (*st).difference_position;
+                (*st).offset = (*st).difference_offset;
+                (*st).side = 0u;
+                (*st).real_t_min = (*st).difference_t_min;
+                (*st).direction = (*st).difference_direction;
+                (*st).density = (*st).difference_density;
+                (*st).throughput = (*st).difference_throughput;
+                (*st).indirect = 1u;
+                (*st).depth = (*st).difference_depth;
+                (*st).t_max = FAR;
+                (*st).stage = STAGE_DIFFERENCE_BSDF;
+                (*st).request = select(REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, (*st).difference_lambertian != 0u);
+                return;
+            }
         }
         (*st).stage = STAGE_DONE;
         return;
@@ -279,9 +281,13 @@ fn difference_bsdf(st: ptr<function, PathState>) {
             }
             split_difference(st);
         }
-    } else if (*st).hit_real.triangle != NONE && (*st).depth < frame.max_bounces {
-        (*st).depth += 1u;
-        plan_vertex(st, (*st).hit_real);
+        return;
+    }
+    @if(multi_bounce) {
+        if (*st).hit_real.triangle != NONE && (*st).depth < frame.max_bounces {
+            (*st).depth += 1u;
+            plan_vertex(st, (*st).hit_real);
+        }
     }
 }
 

@@ -36,8 +36,18 @@ fn max_element(v: vec3<f32>) -> f32 {
     return max(max(v.x, v.y), v.z);
 }
 
+// The `paper` estimator knows no such mode.
+fn is_difference(st: ptr<function, PathState>) -> bool {
+    @if(paper) {
+        return false;
+    }
+    @else {
+        return (*st).mode == MODE_DIFFERENCE;
+    }
+}
+
 fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
-    let difference = (*st).mode == MODE_DIFFERENCE;
+    let difference = is_difference(st);
     let wo = -(*st).direction;
     let distance = (*st).vertex_hit.t;
     if !difference {
@@ -58,17 +68,19 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     (*st).real_t_min = materials[s.material].self_shadow_bias;
 
     var roulette = Roulette(1.0, 1.0);
-    if difference {
-        let strength = max_element(abs((*st).throughput * bsdf_albedo(s, wo)));
-        let reach = cone_solid_angle_fraction(s.position, s.ns);
-        roulette.cone = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
-        if bsdf_is_lambertian(s) {
-            roulette.bsdf = clamp(RECURSION_ROULETTE_GAIN * strength, RECURSION_ROULETTE_FLOOR, 1.0);
+    @if(!paper) {
+        if difference {
+            let strength = max_element(abs((*st).throughput * bsdf_albedo(s, wo)));
+            let reach = cone_solid_angle_fraction(s.position, s.ns);
+            roulette.cone = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
+            if bsdf_is_lambertian(s) {
+                roulette.bsdf = clamp(RECURSION_ROULETTE_GAIN * strength, RECURSION_ROULETTE_FLOOR, 1.0);
+            }
         }
     }
     next_event(st, s, wo, roulette);
-    if difference {
-        plan_cone(st, s, wo, roulette);
+    @if(!paper) {
+        if difference { plan_cone(st, s, wo, roulette); }
     }
     plan_continuation(st, s, wo, roulette);
 }
@@ -86,12 +98,12 @@ fn add_emission(st: ptr<function, PathState>, s: Surface, distance: f32) {
 }
 
 fn light_draws(st: ptr<function, PathState>) -> u32 {
-    return select(1u, DIFFERENCE_LIGHTS, (*st).mode == MODE_DIFFERENCE && (*st).depth == 1u);
+    return select(1u, DIFFERENCE_LIGHTS, is_difference(st) && (*st).depth == 1u);
 }
 
 fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
     if frame.light_count == 0u || bsdf_is_delta(s) { return; }
-    let difference = (*st).mode == MODE_DIFFERENCE;
+    let difference = is_difference(st);
     let set_id = select(SET_PATH_LIGHT, SET_DIFFERENCE_LIGHT, difference);
     let count = light_draws(st);
     var choice = vec4<f32>(0.0);
@@ -116,18 +128,22 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette:
 fn light_contribution(
     st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette, l: LightSample, count: f32,
 ) -> vec3<f32> {
-    let difference = (*st).mode == MODE_DIFFERENCE;
+    let difference = is_difference(st);
     let real_light = l.side == 0u;
     if l.pdf <= 0.0 || ((*st).mode == MODE_REAL && !real_light) { return vec3<f32>(0.0); }
-    if difference && real_light && !direction_meets_spheres(s.position, l.direction) { return vec3<f32>(0.0); }
+    @if(!paper) {
+        if difference && real_light && !direction_meets_spheres(s.position, l.direction) { return vec3<f32>(0.0); }
+    }
     let f = bsdf_eval(s, wo, l.direction);
     if max_element(f.f_cos) <= 0.0 { return vec3<f32>(0.0); }
     var weight = 1.0;
     if !l.delta {
         var other = f.pdf;
-        if difference {
-            other = roulette.cone * cone_pdf(s.position, s.ns, l.direction);
-            if !bsdf_is_lambertian(s) { other += f.pdf; }
+        @if(!paper) {
+            if difference {
+                other = roulette.cone * cone_pdf(s.position, s.ns, l.direction);
+                if !bsdf_is_lambertian(s) { other += f.pdf; }
+            }
         }
         weight = count * l.pdf / (count * l.pdf + other);
     }
@@ -143,7 +159,7 @@ fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample) {
     }
     let real_light = l.side == 0u;
     var request = REQUEST_SHADOW_MIXED;
-    if (*st).mode == MODE_DIFFERENCE && real_light { request = REQUEST_SHADOW_DIFFERENCE; }
+    if is_difference(st) && real_light { request = REQUEST_SHADOW_DIFFERENCE; }
     if (*st).mode == MODE_REAL { request = REQUEST_SHADOW_REAL; }
     @if(paper) {
         if (*st).mode == MODE_SHARED && real_light { request = REQUEST_SHADOW_PAIR; }
@@ -168,7 +184,7 @@ fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: 
 }
 
 fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
-    let difference = (*st).mode == MODE_DIFFERENCE;
+    let difference = is_difference(st);
     if difference && bsdf_is_lambertian(s) && (*st).depth >= frame.max_bounces { return; }
     let u = draw(st, select(SET_PATH_BSDF, SET_DIFFERENCE_BSDF, difference));
     if u.w >= roulette.bsdf { return; }
@@ -176,24 +192,28 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, ro
     if !b.valid { return; }
     let density = select(b.pdf, DELTA_DENSITY, b.delta);
     var throughput = (*st).throughput * b.weight;
-    if difference {
-        (*st).pending |= PENDING_DIFFERENCE;
-        (*st).difference_position = (*st).position;
-        (*st).difference_offset = (*st).offset;
-        (*st).difference_t_min = (*st).real_t_min;
-        (*st).difference_depth = (*st).depth;
-        (*st).difference_direction = b.wi;
-        (*st).difference_lambertian = u32(bsdf_is_lambertian(s));
-        (*st).difference_normal = s.ns;
-        (*st).difference_cone_probability = roulette.cone / f32(light_draws(st));
-        (*st).difference_density = select(b.pdf / f32(light_draws(st)), DELTA_DENSITY, b.delta);
-        (*st).difference_throughput = throughput * (1.0 / roulette.bsdf);
-        return;
+    @if(!paper) {
+        if difference {
+            (*st).pending |= PENDING_DIFFERENCE;
+            (*st).difference_position = (*st).position;
+            (*st).difference_offset = (*st).offset;
+            (*st).difference_t_min = (*st).real_t_min;
+            (*st).difference_depth = (*st).depth;
+            (*st).difference_direction = b.wi;
+            (*st).difference_lambertian = u32(bsdf_is_lambertian(s));
+            (*st).difference_normal = s.ns;
+            (*st).difference_cone_probability = roulette.cone / f32(light_draws(st));
+            (*st).difference_density = select(b.pdf / f32(light_draws(st)), DELTA_DENSITY, b.delta);
+            (*st).difference_throughput = throughput * (1.0 / roulette.bsdf);
+            return;
+        }
     }
-    if (*st).depth >= ROULETTE_FROM_DEPTH {
-        let survival = min(ROULETTE_GAIN * max_element(abs(throughput)), 1.0);
-        if u.w >= survival { return; }
-        throughput *= 1.0 / survival;
+    @if(multi_bounce) {
+        if (*st).depth >= ROULETTE_FROM_DEPTH {
+            let survival = min(ROULETTE_GAIN * max_element(abs(throughput)), 1.0);
+            if u.w >= survival { return; }
+            throughput *= 1.0 / survival;
+        }
     }
     @if(transmission) {
         if b.transmitted && (s.flags & MATERIAL_THIN_WALLED) == 0u {

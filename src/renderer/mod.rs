@@ -313,6 +313,14 @@ impl Renderer {
         Ok(())
     }
 
+    /// For tests: the graphics device, if one renders, is destroyed before its n-th batch from now.
+    #[doc(hidden)]
+    pub fn lose_device_after(&mut self, batches: u32) {
+        if let Backend::Gpu(gpu) = &mut self.backend {
+            gpu.lose_device_after(batches);
+        }
+    }
+
     fn run_pass(&mut self, pass: Pass, cancel: &Cancel) -> Result<(), RenderError> {
         if let Backend::Gpu(gpu) = &mut self.backend {
             match gpu.render_pass(&self.packed, &mut self.film, pass, cancel, &mut self.rays) {
