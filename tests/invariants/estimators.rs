@@ -46,7 +46,7 @@ const SKY: &str = "[environment]\nradiance = [0.5, 0.6, 0.8]\n";
 
 fn room(rest: &str) -> Scene {
     let mut scene = scene(&format!("{CAMERA}{rest}"));
-    scene.settings.rays_per_pixel = 16;
+    scene.settings.rays_per_pixel = 128;
     scene
 }
 
