@@ -186,10 +186,7 @@ fn block(block: &TriangleBlock, lanes: &Lanes, limit: f32) -> (u32, [Eight; 3]) 
         ),
     );
     let mask = _mm256_movemask_ps(_mm256_and_ps(hit, bounded));
-    (
-        mask as u32,
-        [t, second, third].map(|row| bytemuck::cast(row)),
-    )
+    (mask as u32, [t, second, third].map(bytemuck::cast))
 }
 
 /// Asks for the cache lines of a node or of a leaf's first block.

@@ -14,8 +14,14 @@ pub const MODULES: &[(&str, &str)] = &[
     ("bindings", include_str!("../../shaders/bindings.wgsl")),
     ("bsdf", include_str!("../../shaders/bsdf.wgsl")),
     ("cones", include_str!("../../shaders/cones.wgsl")),
-    ("contribution", include_str!("../../shaders/contribution.wgsl")),
-    ("environment", include_str!("../../shaders/environment.wgsl")),
+    (
+        "contribution",
+        include_str!("../../shaders/contribution.wgsl"),
+    ),
+    (
+        "environment",
+        include_str!("../../shaders/environment.wgsl"),
+    ),
     ("estimator", include_str!("../../shaders/estimator.wgsl")),
     ("film", include_str!("../../shaders/film.wgsl")),
     ("fresnel", include_str!("../../shaders/fresnel.wgsl")),

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::environment::{env_direction_pdf, env_sample};
+use crate::material::triangle_emission;
 use crate::math::{dot3, length3, safe_sqrt};
 use crate::packed::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE,
@@ -76,7 +77,7 @@ pub fn light_sample(scene: &PackedScene, position: Vec3, u: [f32; 4]) -> LightSa
             side: light.side,
         },
         LIGHT_POINT | LIGHT_SPOT => sample_point_light(light, position),
-        _ => sample_area_light(light, position, u[1], u[2]),
+        _ => sample_area_light(scene, light, position, u[1], u[2]),
     }
 }
 
@@ -110,7 +111,13 @@ fn spot_falloff(light: &Light, cos: f32) -> f32 {
 }
 
 /// Uniform over the area; a quad emits to the side of axis_u x axis_v only, a triangle to both.
-fn sample_area_light(light: &Light, position: Vec3, u0: f32, u1: f32) -> LightSample {
+fn sample_area_light(
+    scene: &PackedScene,
+    light: &Light,
+    position: Vec3,
+    u0: f32,
+    u1: f32,
+) -> LightSample {
     let (mut a, mut b) = (u0, u1);
     if light.kind != LIGHT_QUAD {
         let root = safe_sqrt(u0);
@@ -128,10 +135,14 @@ fn sample_area_light(light: &Light, position: Vec3, u0: f32, u1: f32) -> LightSa
     if pdf <= 0.0 {
         return no_light();
     }
+    let mut radiance = xyz(light.radiance);
+    if light.triangle != NONE {
+        radiance = triangle_emission(scene, light.triangle, a, b);
+    }
     LightSample {
         direction,
         distance,
-        radiance: xyz(light.radiance),
+        radiance,
         pdf,
         delta: false,
         side: light.side,

@@ -21,6 +21,7 @@ mod control;
 mod photo_albedo;
 mod stats;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
@@ -28,8 +29,9 @@ pub use stats::Stats;
 
 use crate::cpu;
 use crate::film::{Film, Picture, Planes, composite, planes};
+use crate::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError};
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
-use crate::scene::{Composite, Exposure, Scene};
+use crate::scene::{BackendChoice, Composite, Exposure, Scene};
 
 /// The longest a pass runs before the film is shown, in rays per pixel.
 const MAX_PASS_SAMPLES: u32 = 8;
@@ -45,6 +47,8 @@ pub struct RendererOptions {
 pub enum RenderError {
     #[error(transparent)]
     Pack(#[from] crate::packed::PackError),
+    #[error(transparent)]
+    Gpu(#[from] crate::gpu::GpuError),
     #[error("there is no object number {0} in the scene")]
     NoSuchObject(usize),
 }
@@ -73,6 +77,7 @@ pub struct Renderer {
 
 enum Backend {
     Cpu,
+    Gpu(Box<GpuBackend>),
 }
 
 impl Renderer {
@@ -101,7 +106,31 @@ impl Renderer {
         };
         renderer.prepare();
         renderer.seconds.build = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        renderer.backend = renderer.open_backend()?;
+        renderer.seconds.compile = start.elapsed().as_secs_f64();
         Ok(renderer)
+    }
+
+    fn open_backend(&mut self) -> Result<Backend, RenderError> {
+        let choice = match self.scene.settings.backend {
+            BackendChoice::Cpu => return Ok(Backend::Cpu),
+            BackendChoice::Gpu => AdapterChoice::Any,
+            BackendChoice::Auto => AdapterChoice::Hardware,
+        };
+        let opened =
+            GpuDevice::open(choice).and_then(|gpu| GpuBackend::new(Arc::new(gpu), &self.packed));
+        match opened {
+            Ok(gpu) => Ok(Backend::Gpu(Box::new(gpu))),
+            Err(error) if self.scene.settings.backend == BackendChoice::Auto => {
+                if !matches!(error, GpuError::NoAdapter(_)) {
+                    self.notes
+                        .push(format!("the CPU renders, for the GPU cannot: {error}"));
+                }
+                Ok(Backend::Cpu)
+            }
+            Err(error) => Err(error.into()),
+        }
     }
 
     /// What follows from the packed scene: exposure, albedo from the photograph, the pilot.
@@ -194,6 +223,17 @@ impl Renderer {
     }
 
     fn run_pass(&mut self, pass: Pass, cancel: &Cancel) -> Result<(), RenderError> {
+        if let Backend::Gpu(gpu) = &mut self.backend {
+            match gpu.render_pass(&self.packed, &mut self.film, pass, cancel, &mut self.rays) {
+                Err(error @ GpuError::Lost(_)) => {
+                    self.notes.push(format!(
+                        "{error}; the CPU goes on from what was accumulated"
+                    ));
+                    self.backend = Backend::Cpu;
+                }
+                other => return Ok(other?),
+            }
+        }
         self.rays += cpu::render::render_pass(&self.packed, &mut self.film, pass, cancel);
         Ok(())
     }
@@ -254,6 +294,7 @@ impl Renderer {
     pub fn backend_name(&self) -> &'static str {
         match self.backend {
             Backend::Cpu => "cpu",
+            Backend::Gpu(_) => "gpu",
         }
     }
 
@@ -261,6 +302,7 @@ impl Renderer {
     pub fn device_name(&self) -> String {
         match &self.backend {
             Backend::Cpu => format!("{} CPU threads", rayon::current_num_threads()),
+            Backend::Gpu(gpu) => gpu.device_name(),
         }
     }
 }
