@@ -8,7 +8,7 @@ import package::contribution::{
     SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
 };
 import package::lights::{light_pdf_hit, light_sample};
-import package::math::exp_;
+import package::math::{dot3, exp_};
 import package::state::{
     DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_SHADOW, PathState,
     REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED, REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL,
@@ -39,13 +39,13 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     let difference = (*st).mode == MODE_DIFFERENCE;
     let wo = -(*st).direction;
     let distance = (*st).vertex_hit.t;
-    if !difference {
-        @if(transmission) {
-            if (*st).medium != NONE {
-                let sigma = materials[(*st).medium].sigma_a;
-                (*st).throughput *= vec3<f32>(exp_(-sigma.x * distance), exp_(-sigma.y * distance), exp_(-sigma.z * distance));
-            }
+    @if(transmission) {
+        if (*st).medium != NONE {
+            let sigma = materials[(*st).medium].sigma_a;
+            (*st).throughput *= vec3<f32>(exp_(-sigma.x * distance), exp_(-sigma.y * distance), exp_(-sigma.z * distance));
         }
+    }
+    if !difference {
         add_emission(st, s, distance);
     }
     if (*st).depth > frame.max_bounces || (s.flags & EMITS_ONLY) != 0u || all((*st).throughput == vec3<f32>(0.0)) {
@@ -59,7 +59,7 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     var roulette = Roulette(1.0, 1.0);
     if difference {
         let strength = max_element(abs((*st).throughput * bsdf_albedo(s, wo)));
-        let reach = cone_solid_angle_fraction(s.position, s.ns);
+        let reach = cone_solid_angle_fraction(s.position, s.ng);
         roulette.cone = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
         if bsdf_is_lambertian(s) {
             roulette.bsdf = clamp(RECURSION_ROULETTE_GAIN * strength * reach, RECURSION_ROULETTE_FLOOR, 1.0);
@@ -97,7 +97,7 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette:
     if !l.delta {
         var other = f.pdf;
         if difference {
-            other = roulette.cone * cone_pdf(s.position, s.ns, l.direction);
+            other = roulette.cone * cone_pdf(s.position, s.ng, l.direction);
             if !bsdf_is_lambertian(s) { other += f.pdf; }
         }
         weight = l.pdf / (l.pdf + other);
@@ -122,7 +122,7 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette:
 fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
     let u = draw(st, SET_DIFFERENCE_CONE);
     if frame.sphere_count == 0u || u.w >= roulette.cone { return; }
-    let c = cone_sample(s.position, s.ns, u.xyz);
+    let c = cone_sample(s.position, s.ng, u.xyz);
     if c.pdf <= 0.0 { return; }
     let f = bsdf_eval(s, wo, c.direction);
     if max_element(f.f_cos) <= 0.0 { return; }
@@ -132,6 +132,16 @@ fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: 
     (*st).next_direction = c.direction;
     (*st).next_throughput = (*st).throughput * f.f_cos * (1.0 / density);
     (*st).next_density = density;
+    (*st).next_medium = medium_along(st, s, c.direction);
+}
+
+fn medium_along(st: ptr<function, PathState>, s: Surface, direction: vec3<f32>) -> u32 {
+    @if(transmission) {
+        if (s.flags & MATERIAL_THIN_WALLED) == 0u && dot3(s.ng, direction) < 0.0 {
+            return select(NONE, s.material, s.front);
+        }
+    }
+    return (*st).medium;
 }
 
 fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
@@ -151,10 +161,11 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, ro
         (*st).difference_depth = (*st).depth;
         (*st).difference_direction = b.wi;
         (*st).difference_lambertian = u32(bsdf_is_lambertian(s));
-        (*st).difference_normal = s.ns;
+        (*st).difference_normal = s.ng;
         (*st).difference_cone_probability = roulette.cone;
         (*st).difference_density = density;
         (*st).difference_throughput = throughput * (1.0 / roulette.bsdf);
+        (*st).difference_medium = medium_along(st, s, b.wi);
         return;
     }
     if (*st).depth >= ROULETTE_FROM_DEPTH {
@@ -162,13 +173,9 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, ro
         if u.w >= survival { return; }
         throughput *= 1.0 / survival;
     }
-    @if(transmission) {
-        if b.transmitted && (s.flags & MATERIAL_THIN_WALLED) == 0u {
-            (*st).medium = select(NONE, s.material, s.front);
-        }
-    }
     (*st).pending |= PENDING_NEXT;
     (*st).next_direction = b.wi;
     (*st).next_throughput = throughput;
     (*st).next_density = density;
+    (*st).next_medium = medium_along(st, s, b.wi);
 }

@@ -51,7 +51,8 @@ pub fn answer(scene: &PackedScene, st: &mut PathState) {
             hit_real = trace_world(scene, st, WORLD_REAL, t_max, false);
             if hit_real.triangle != NONE {
                 st.rays.mixed += 1;
-                hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, hit_real.t, true);
+                let covering = hit_real.t * (1.0 + COINCIDENCE);
+                hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, covering, true);
             }
         }
         REQUEST_SHADOW_MIXED => {

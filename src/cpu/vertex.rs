@@ -44,15 +44,15 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     let difference = st.mode == MODE_DIFFERENCE;
     let wo = -st.direction;
     let distance = st.vertex_hit.t;
+    if st.medium != NONE {
+        let sigma = scene.materials[st.medium as usize].sigma_a;
+        st.throughput *= Vec3::new(
+            exp_(-sigma[0] * distance),
+            exp_(-sigma[1] * distance),
+            exp_(-sigma[2] * distance),
+        );
+    }
     if !difference {
-        if st.medium != NONE {
-            let sigma = scene.materials[st.medium as usize].sigma_a;
-            st.throughput *= Vec3::new(
-                exp_(-sigma[0] * distance),
-                exp_(-sigma[1] * distance),
-                exp_(-sigma[2] * distance),
-            );
-        }
         add_emission(scene, st, s, distance);
     }
     if st.depth > scene.frame.max_bounces
@@ -76,7 +76,7 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     };
     if difference {
         let strength = (st.throughput * bsdf_albedo(s, wo)).abs().max_element();
-        let reach = cone_solid_angle_fraction(&scene.frame, s.position, s.ns);
+        let reach = cone_solid_angle_fraction(&scene.frame, s.position, s.ng);
         roulette.cone = (CONE_ROULETTE_GAIN * strength * reach).clamp(CONE_ROULETTE_FLOOR, 1.0);
         if bsdf_is_lambertian(s) {
             roulette.bsdf =
@@ -137,7 +137,7 @@ fn next_event(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, ro
     if !l.delta {
         let mut other = f.pdf;
         if difference {
-            other = roulette.cone * cone_pdf(&scene.frame, s.position, s.ns, l.direction);
+            other = roulette.cone * cone_pdf(&scene.frame, s.position, s.ng, l.direction);
             if !bsdf_is_lambertian(s) {
                 other += f.pdf;
             }
@@ -161,13 +161,14 @@ fn next_event(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, ro
     st.pending |= PENDING_SHADOW;
 }
 
-/// (b): a direction inside the cones of the virtual bounding spheres.
+/// (b): a direction inside the cones of the virtual bounding spheres, above the geometric horizon: smooth shading normals scatter light
+/// from everywhere above it.
 fn plan_cone(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, roulette: Roulette) {
     let u = draw(scene, st, SET_DIFFERENCE_CONE);
     if scene.frame.sphere_count == 0 || u[3] >= roulette.cone {
         return;
     }
-    let c = cone_sample(&scene.frame, s.position, s.ns, [u[0], u[1], u[2]]);
+    let c = cone_sample(&scene.frame, s.position, s.ng, [u[0], u[1], u[2]]);
     if c.pdf <= 0.0 {
         return;
     }
@@ -183,6 +184,15 @@ fn plan_cone(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, rou
     st.next_direction = c.direction;
     st.next_throughput = st.throughput * f.f_cos * (1.0 / density);
     st.next_density = density;
+    st.next_medium = medium_along(st, s, c.direction);
+}
+
+/// Material whose volume a direction from the vertex leads through, or NONE.
+fn medium_along(st: &PathState, s: &Surface, direction: Vec3) -> u32 {
+    if s.flags & MATERIAL_THIN_WALLED != 0 || s.ng.dot(direction) >= 0.0 {
+        return st.medium;
+    }
+    if s.front { s.material } else { NONE }
 }
 
 /// The BSDF's own direction: the path's next ray, or (c) the recursion of the difference.
@@ -223,10 +233,11 @@ fn plan_continuation(
         st.difference_depth = st.depth;
         st.difference_direction = b.wi;
         st.difference_lambertian = bsdf_is_lambertian(s);
-        st.difference_normal = s.ns;
+        st.difference_normal = s.ng;
         st.difference_cone_probability = roulette.cone;
         st.difference_density = density;
         st.difference_throughput = throughput * (1.0 / roulette.bsdf);
+        st.difference_medium = medium_along(st, s, b.wi);
         return;
     }
     if st.depth >= ROULETTE_FROM_DEPTH {
@@ -236,11 +247,9 @@ fn plan_continuation(
         }
         throughput *= 1.0 / survival;
     }
-    if b.transmitted && s.flags & MATERIAL_THIN_WALLED == 0 {
-        st.medium = if s.front { s.material } else { NONE };
-    }
     st.pending |= PENDING_NEXT;
     st.next_direction = b.wi;
     st.next_throughput = throughput;
     st.next_density = density;
+    st.next_medium = medium_along(st, s, b.wi);
 }

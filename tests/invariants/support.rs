@@ -36,7 +36,7 @@ pub const CAMERA: &str = r#"
 [camera]
 width = 32
 height = 24
-vertical_fov_deg = 40
+vertical_fov_deg = 28
 position = [0, 1, 3]
 look_at = [0, 0.25, 0]
 "#;
