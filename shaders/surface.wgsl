@@ -110,7 +110,7 @@ fn triangle_emission(triangle: u32, u: f32, v: f32) -> vec3<f32> {
             emission *= slot_rgb(entry.emissive_texture, uv0, uv1);
         }
     }
-    return emission;
+    return emission * surface_alpha(Hit(0.0, u, v, triangle));
 }
 
 fn photo_albedo_at(position: vec3<f32>) -> vec3<f32> {

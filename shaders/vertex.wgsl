@@ -77,7 +77,8 @@ fn add_emission(st: ptr<function, PathState>, s: Surface, distance: f32) {
     var weight = 1.0;
     @if(area_lights) {
         if s.light != NONE && (*st).density != DELTA_DENSITY {
-            weight = density_weight((*st).density, light_pdf_hit(s.light, (*st).direction, distance));
+            let from_position = s.position - (*st).direction * distance;
+            weight = density_weight((*st).density, light_pdf_hit(s.light, from_position, (*st).direction, distance));
         }
     }
     accumulate(st, (*st).throughput * s.emission * weight);

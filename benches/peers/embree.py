@@ -118,10 +118,11 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=15, help="alternations (default 15)")
     parser.add_argument("--robust", action="store_true", help="Embree's robust mode")
+    parser.add_argument("--isa", help="instructions that Embree may use, such as avx2 (default: all, AVX-512 included)")
     arguments = parser.parse_args()
     root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
     library = load_embree()
-    device = ctypes.c_void_p(library.rtcNewDevice(None))
+    device = ctypes.c_void_p(library.rtcNewDevice(f"isa={arguments.isa}".encode() if arguments.isa else None))
     with tempfile.TemporaryDirectory() as folder:
         source, binary = os.path.join(folder, "loop.c"), os.path.join(folder, "loop.so")
         with open(source, "w") as file:
@@ -164,8 +165,8 @@ def main():
                 total_distance += distance.value
             return np.array(seconds), total_hits, total_distance
 
-        mode = "robust" if arguments.robust else "default"
-        print(f"Mrays/s on one thread, each chunk's fastest of {arguments.rounds} alternations; Embree in {mode} mode")
+        mode = ("robust" if arguments.robust else "default") + " mode, " + (arguments.isa or "all instructions")
+        print(f"Mrays/s on one thread, each chunk's fastest of {arguments.rounds} alternations; Embree in {mode}")
         print(f"{'mesh':<14} {'rays':<11} {'query':<8} {'mixray':>8} {'embree':>8} {'ratio':>6} {'medians':>7}")
         agreed = True
         for name in names:

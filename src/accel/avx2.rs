@@ -37,6 +37,7 @@ impl Lanes {
     #[inline]
     #[target_feature(enable = "avx2,fma,bmi1,lzcnt,popcnt")]
     fn new(frame: &RayFrame) -> Lanes {
+        let along = |axis: usize| _mm256_set1_ps(frame.origin[axis.min(2)]);
         let [kx, ky, kz] = frame.axes;
         let origin = [
             _mm256_set1_ps(frame.origin[0]),
@@ -52,7 +53,7 @@ impl Lanes {
             ],
             near_side: frame.near_side.map(|side| side & 1),
             axes: frame.axes,
-            sheared_origin: [origin[kx], origin[ky], origin[kz]],
+            sheared_origin: [along(kx), along(ky), along(kz)],
             shear: [
                 _mm256_set1_ps(frame.shear[0]),
                 _mm256_set1_ps(frame.shear[1]),

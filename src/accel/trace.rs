@@ -52,6 +52,7 @@ pub(super) struct RayFrame {
 
 impl RayFrame {
     /// `None` for a ray that hits nothing whatever there is: not finite, without direction or with an empty interval.
+    #[inline]
     fn new(ray: &Ray) -> Option<RayFrame> {
         let origin = ray.origin.to_array();
         // -0 + 0 is +0, so that both zeros take the same inverse.

@@ -98,7 +98,13 @@ fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: 
     if s.light != NONE && st.density != DELTA_DENSITY {
         weight = density_weight(
             st.density,
-            light_pdf_hit(scene, s.light, st.direction, distance),
+            light_pdf_hit(
+                scene,
+                s.light,
+                s.position - st.direction * distance,
+                st.direction,
+                distance,
+            ),
         );
     }
     let light = st.throughput * s.emission * weight;

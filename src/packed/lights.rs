@@ -23,22 +23,20 @@ const EMISSION_POINTS: [[f32; 2]; 7] = [
 
 /// Fills `packed.lights`, the triangles' light indices and the frame's light fields.
 pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
+    // The scene's lights come first, in their order: a quad's triangles already name theirs.
     for triangle in &mut packed.triangles {
-        triangle.light = NONE;
+        let flags = packed.materials[triangle.material as usize].flags;
+        if flags & MATERIAL_QUAD_LIGHT == 0 {
+            triangle.light = NONE;
+        }
     }
     let mut lights = Vec::new();
     let mut powers = Vec::new();
     let radius = scene_radius(packed);
     let anchor = DVec3::from(packed.anchor_m);
-    let mut quads = [quad_triangles(packed, 0), quad_triangles(packed, 1)];
     for light in &scene.lights {
         let side = u32::from(light.side == Side::Virtual);
         let (record, power) = pack_light(&light.kind, side, anchor, radius);
-        if record.kind == LIGHT_QUAD {
-            for triangle in quads[side as usize].drain(..2) {
-                packed.triangles[triangle].light = lights.len() as u32;
-            }
-        }
         lights.push(record);
         powers.push(power);
     }
@@ -52,21 +50,6 @@ pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
     set_probabilities(&mut lights, &powers);
     packed.frame.light_count = lights.len() as u32;
     packed.lights = lights;
-}
-
-/// Triangles of the quad lights of one side, two a quad, in the order of the scene's lights.
-fn quad_triangles(packed: &PackedScene, side: u32) -> Vec<usize> {
-    let real = packed.frame.real_triangle_count as usize;
-    let range = if side == 0 {
-        0..real
-    } else {
-        real..packed.triangles.len()
-    };
-    range
-        .filter(|&i| {
-            packed.materials[packed.triangles[i].material as usize].flags & MATERIAL_QUAD_LIGHT != 0
-        })
-        .collect()
 }
 
 /// Radius about the anchor that holds three quarters of the vertices: outliers must not make the environment seem all-important.

@@ -24,6 +24,8 @@ mod stats;
 use std::sync::Arc;
 use std::time::Instant;
 
+use glam::DMat4;
+
 pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
 pub use stats::Stats;
 
@@ -31,7 +33,7 @@ use crate::cpu;
 use crate::film::{Film, Picture, Planes, composite, planes};
 use crate::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError};
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
-use crate::scene::{BackendChoice, Composite, Exposure, Scene};
+use crate::scene::{BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Side};
 
 /// The longest a pass runs before the film is shown, in rays per pixel.
 const MAX_PASS_SAMPLES: u32 = 8;
@@ -104,7 +106,8 @@ impl Renderer {
             seconds: Seconds::default(),
             notes: Vec::new(),
         };
-        renderer.prepare();
+        renderer.prepare_photo();
+        renderer.packed.pixels = cpu::pilot(&renderer.packed);
         renderer.seconds.build = start.elapsed().as_secs_f64();
         let start = Instant::now();
         renderer.backend = renderer.open_backend()?;
@@ -133,8 +136,8 @@ impl Renderer {
         }
     }
 
-    /// What follows from the packed scene: exposure, albedo from the photograph, the pilot.
-    fn prepare(&mut self) {
+    /// What follows from the real world and its light: exposure, and albedo from the photograph.
+    fn prepare_photo(&mut self) {
         if self.options.all_planes {
             self.packed.frame.flags |= FRAME_AOVS;
         }
@@ -162,7 +165,6 @@ impl Renderer {
                 photo_albedo::estimate_photo_albedo(&mut self.packed, photo);
             }
         }
-        self.packed.pixels = cpu::pilot(&self.packed);
     }
 
     /// True if no pixel is within reach of anything virtual: the picture is the photograph.
@@ -219,6 +221,95 @@ impl Renderer {
             self.options.all_planes || self.scene.settings.composite == Composite::Quotient;
         self.run_pass(Pass::Real { everywhere }, &Cancel::new(&|| false, None))?;
         self.seconds.render += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Another lens. Nothing is rebuilt but the pilot; the film starts anew.
+    ///
+    /// # Errors
+    /// The new scene does not fit the adapter.
+    pub fn set_lens(&mut self, lens: Lens) -> Result<(), RenderError> {
+        self.scene.lens = lens;
+        self.packed.set_camera(&self.scene);
+        self.restart(false)
+    }
+
+    /// Another camera pose. While it stays near the anchor nothing is rebuilt but the pilot.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn set_camera_pose(&mut self, world_from_camera: DMat4) -> Result<(), RenderError> {
+        self.scene.camera.world_from_camera = world_from_camera;
+        if self.packed.anchor_serves(&self.scene) {
+            self.packed.set_camera(&self.scene);
+        } else {
+            self.packed = PackedScene::build(&self.scene)?;
+        }
+        self.restart(true)
+    }
+
+    /// Moves an object of the scene. A virtual one costs the virtual BVH, a real one everything.
+    ///
+    /// # Errors
+    /// There is no such object, or as [`Renderer::new`].
+    pub fn set_object_transform(
+        &mut self,
+        object: usize,
+        world_from_object: DMat4,
+    ) -> Result<(), RenderError> {
+        let entry = self
+            .scene
+            .objects
+            .get_mut(object)
+            .ok_or(RenderError::NoSuchObject(object))?;
+        entry.world_from_object = world_from_object;
+        let real = entry.side == Side::Real;
+        match entry.side {
+            Side::Virtual => self.packed.rebuild_virtual(&self.scene)?,
+            Side::Real => self.packed = PackedScene::build(&self.scene)?,
+        }
+        self.restart(real)
+    }
+
+    /// Other lights. Real quads are part of the real world, so where they change it is built anew.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn set_lights(&mut self, lights: Vec<Light>) -> Result<(), RenderError> {
+        let real_quads = |lights: &[Light]| -> Vec<Light> {
+            lights
+                .iter()
+                .filter(|l| l.side == Side::Real && matches!(l.kind, LightKind::Quad { .. }))
+                .cloned()
+                .collect()
+        };
+        let real_world_changes = real_quads(&self.scene.lights) != real_quads(&lights);
+        self.scene.lights = lights;
+        if real_world_changes {
+            self.packed = PackedScene::build(&self.scene)?;
+        } else {
+            self.packed.rebuild_virtual(&self.scene)?;
+        }
+        self.restart(true)
+    }
+
+    /// Takes up the packed scene after an edit.
+    fn restart(&mut self, real_light_changed: bool) -> Result<(), RenderError> {
+        let start = Instant::now();
+        if real_light_changed {
+            self.prepare_photo();
+        }
+        self.packed.pixels = cpu::pilot(&self.packed);
+        self.film = Film::new(
+            self.film.width,
+            self.film.height,
+            self.film.first_sample,
+            self.options.all_planes,
+        );
+        if let Backend::Gpu(gpu) = &mut self.backend {
+            gpu.set_scene(&self.packed)?;
+        }
+        self.seconds.build += start.elapsed().as_secs_f64();
         Ok(())
     }
 
