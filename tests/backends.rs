@@ -72,7 +72,10 @@ fn renderer(settings: &str, parts: &[&str]) -> Renderer {
     );
     std::fs::write(&path, text).expect("writes");
     let scene = mixray::scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
-    let options = RendererOptions { all_planes: true };
+    let options = RendererOptions {
+        all_planes: true,
+        ..RendererOptions::default()
+    };
     Renderer::new(scene, options).unwrap_or_else(|error| panic!("{error}"))
 }
 

@@ -217,17 +217,33 @@ fn mean_emission(packed: &PackedScene, triangle: usize) -> Vec3 {
     factor * sum / EMISSION_POINTS.len() as f32
 }
 
-/// Half the choice is uniform, half follows the power estimates; alias table after Vose.
+/// Share of the choice that follows the power estimates; the rest is uniform over the lights, all emissive triangles together counting as
+/// one, so that no light is left out and a finely meshed one does not draw all the rays.
+const POWER_SHARE: f64 = 0.8;
+
+/// Probabilities of choosing each light, and their alias table after Vose.
 fn set_probabilities(lights: &mut [Light], powers: &[f64]) {
     let n = lights.len() as f64;
     let total: f64 = powers.iter().sum();
-    let mut scaled: Vec<f64> = powers
+    let is_triangle = |l: &Light| l.kind == LIGHT_TRIANGLE;
+    let triangles = lights.iter().zip(powers).filter(|(l, _)| is_triangle(l));
+    let triangle_power: f64 = triangles.map(|(_, p)| p).sum();
+    let count =
+        lights.iter().filter(|l| !is_triangle(l)).count() as f64 + f64::from(triangle_power > 0.0);
+    let mut scaled: Vec<f64> = lights
         .iter()
-        .map(|p| {
-            if total > 0.0 {
-                0.5 + 0.5 * n * p / total
+        .zip(powers)
+        .map(|(light, power)| {
+            let unit = if is_triangle(light) {
+                power / triangle_power
             } else {
                 1.0
+            };
+            let uniform = n * unit / count;
+            if total > 0.0 {
+                (1.0 - POWER_SHARE) * uniform + POWER_SHARE * n * power / total
+            } else {
+                uniform
             }
         })
         .collect();

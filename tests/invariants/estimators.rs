@@ -253,6 +253,19 @@ material = { base_color = [0.8, 0.8, 0.8], specular = 0.0 }
     agree("coarse smooth glossy ball", &scene, &[1, 2], backend);
 }
 
+/// Shading normals far from the geometric one: light from under the shading horizon counts too.
+fn tilted_normals(backend: BackendChoice) {
+    let mut scene = room(&format!("{TABLE}{LAMP}{SKY}{RED_BOX}"));
+    for object in scene.objects.iter_mut().filter(|o| o.name == "table") {
+        for instance in &mut object.instances {
+            let mut primitive = (*instance.primitive).clone();
+            primitive.normals.fill([-0.8, 0.6, 0.0]);
+            instance.primitive = Arc::new(primitive);
+        }
+    }
+    agree("tilted normals", &scene, &[1, 2], backend);
+}
+
 fn virtual_glass(backend: BackendChoice) {
     for (name, material) in [
         ("smooth glass", "roughness = 0.0, transmission = 1.0"),
@@ -328,6 +341,7 @@ on_each_backend!(
     transparency_by_alpha,
     real_things_occlude,
     coarse_smooth_real_ball,
+    tilted_normals,
     virtual_glass,
     real_glass,
     emissive_meshes,

@@ -2,4 +2,6 @@
 //! and each has a control that shows it can fail.
 
 mod estimators;
+mod photograph;
+mod repeatability;
 mod support;

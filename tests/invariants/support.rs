@@ -178,7 +178,9 @@ impl Difference {
         for i in 0..blocks {
             let (x, y) = (column(a, i), column(b, i));
             magnitude += (mean(&x).abs() + mean(&y).abs()) * 0.5;
-            ts.extend(welch(&x, &y));
+            let t = welch(&x, &y);
+
+            ts.extend(t);
         }
         let whole = |set: &[Vec<f64>]| -> Vec<f64> { set.iter().map(|means| mean(means)).collect() };
         let (x, y) = (whole(a), whole(b));
