@@ -2,6 +2,11 @@
 //! and each has a control that shows it can fail.
 
 mod estimators;
+mod extremes;
+mod form_factor;
+mod furnace;
+mod lens;
+mod perfect_proxy;
 mod photograph;
 mod repeatability;
 mod support;
