@@ -178,6 +178,7 @@ fn resume(st: ptr<function, PathState>) {
             (*st).medium = (*st).difference_medium;
             (*st).position = (*st).difference_position;
             (*st).offset = (*st).difference_offset;
+            (*st).coincidence_ratio = (*st).difference_coincidence_ratio;
             (*st).side = 0u;
             (*st).real_t_min = (*st).difference_t_min;
             (*st).direction = (*st).difference_direction;

@@ -151,12 +151,17 @@ fn answer(st: ptr<function, PathState>, thread: u32) {
     (*st).hit_virtual = hit_virtual;
 }
 
-// A ray that leaves a surface starts past it in that surface's own world and before it in the other one, so that it neither meets itself nor
-// slips through what coincides with it.
+// Where a ray starts in its own world and in the other one: see src/cpu/trace.rs.
 fn ray_into(st: ptr<function, PathState>, world: u32, t_max: f32) -> Ray {
     let offset = (*st).offset;
-    let along = select(offset, -offset, dot3((*st).direction, offset) < 0.0);
-    let origin = select((*st).position - along, (*st).position + along, world == (*st).side);
+    var origin = (*st).position;
+    if world == (*st).side {
+        origin += select(offset, -offset, dot3((*st).direction, offset) < 0.0);
+    } else if world == WORLD_REAL {
+        origin += offset * (*st).coincidence_ratio;
+    } else {
+        origin -= offset * (*st).coincidence_ratio;
+    }
     return Ray(origin, select(0.0, (*st).real_t_min, world == WORLD_REAL), (*st).direction, t_max, NONE);
 }
 

@@ -101,6 +101,8 @@ struct PathState {
     next_medium: u32,
     real_medium: u32,
     difference_medium: u32,
+    coincidence_ratio: f32,
+    difference_coincidence_ratio: f32,
     mask: u32,
     rays: RayCounts,
 }

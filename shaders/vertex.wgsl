@@ -8,9 +8,9 @@ import package::contribution::{
     SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CHOICE, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
 };
 import package::lights::{LightSample, light_pdf_hit, light_sample};
-import package::math::{dot3, exp_};
+import package::math::{dot3, exp_, safe_sqrt};
 import package::state::{
-    DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_SHADOW, PathState,
+    COINCIDENCE, DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_SHADOW, PathState,
     REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED, REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL,
 };
 import package::surface::Surface;
@@ -52,9 +52,13 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     if (*st).depth > frame.max_bounces || (s.flags & EMITS_ONLY) != 0u || all((*st).throughput == vec3<f32>(0.0)) {
         return;
     }
+    let side = select(0u, 1u, (*st).vertex_hit.triangle >= frame.real_triangle_count);
+    let leaves_coinciding_real = side == 1u && (*st).side == 0u && coincides(st, s, distance);
+    let reach = 1.0 + COINCIDENCE * distance / s.error;
+    (*st).coincidence_ratio = select(reach, -reach, leaves_coinciding_real);
     (*st).position = s.position;
     (*st).offset = s.ng * s.error;
-    (*st).side = select(0u, 1u, (*st).vertex_hit.triangle >= frame.real_triangle_count);
+    (*st).side = side;
     (*st).real_t_min = materials[s.material].self_shadow_bias;
 
     var roulette = Roulette(1.0, 1.0);
@@ -71,6 +75,12 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
         plan_cone(st, s, wo, roulette);
     }
     plan_continuation(st, s, wo, roulette);
+}
+
+fn coincides(st: ptr<function, PathState>, s: Surface, distance: f32) -> bool {
+    let error2 = dot3((*st).offset, (*st).offset);
+    let errors = 2.0 * (error2 * (1.0 + (*st).coincidence_ratio) + safe_sqrt(error2) * s.error);
+    return abs(dot3((*st).direction, (*st).offset)) * distance <= errors;
 }
 
 fn add_emission(st: ptr<function, PathState>, s: Surface, distance: f32) {
@@ -190,6 +200,7 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, ro
         (*st).pending |= PENDING_DIFFERENCE;
         (*st).difference_position = (*st).position;
         (*st).difference_offset = (*st).offset;
+        (*st).difference_coincidence_ratio = (*st).coincidence_ratio;
         (*st).difference_t_min = (*st).real_t_min;
         (*st).difference_depth = (*st).depth;
         (*st).difference_direction = b.wi;

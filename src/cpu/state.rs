@@ -105,6 +105,9 @@ pub struct PathState {
     /// Vertex the ray leaves, and its geometric normal times the position's error bound.
     pub position: Vec3,
     pub offset: Vec3,
+    /// Times `offset`: how far from the vertex its surface may coincide with one of the other world; negative where a path has come to a
+    /// virtual surface from a real one that coincides with it, which then lies behind.
+    pub coincidence_ratio: f32,
     /// World of that vertex: 0 real, 1 virtual, SIDE_NONE.
     pub side: u32,
     /// The real world is not met closer than this.
@@ -145,6 +148,7 @@ pub struct PathState {
     pub difference_position: Vec3,
     pub difference_t_min: f32,
     pub difference_offset: Vec3,
+    pub difference_coincidence_ratio: f32,
     pub difference_depth: u32,
     pub difference_direction: Vec3,
     pub difference_density: f32,
@@ -184,6 +188,7 @@ impl PathState {
             request: 0,
             position: Vec3::ZERO,
             offset: Vec3::ZERO,
+            coincidence_ratio: 1.0,
             side: SIDE_NONE,
             real_t_min: 0.0,
             direction: Vec3::ZERO,
@@ -210,6 +215,7 @@ impl PathState {
             difference_position: Vec3::ZERO,
             difference_t_min: 0.0,
             difference_offset: Vec3::ZERO,
+            difference_coincidence_ratio: 1.0,
             difference_depth: 0,
             difference_direction: Vec3::ZERO,
             difference_density: 0.0,

@@ -11,7 +11,7 @@ use crate::light::lights::{LightSample, light_pdf_hit, light_sample};
 use crate::material::{
     Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample,
 };
-use crate::math::exp_;
+use crate::math::{dot3, exp_, safe_sqrt};
 use crate::packed::{MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE, PackedScene};
 
 /// Paths shorter than this are never ended by roulette.
@@ -63,13 +63,17 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     {
         return;
     }
-    st.position = s.position;
-    st.offset = s.ng * s.error;
-    st.side = if st.vertex_hit.triangle >= scene.frame.real_triangle_count {
+    let side = if st.vertex_hit.triangle >= scene.frame.real_triangle_count {
         1
     } else {
         0
     };
+    let leaves_coinciding_real = side == 1 && st.side == 0 && coincides(st, s, distance);
+    let reach = 1.0 + COINCIDENCE * distance / s.error;
+    st.coincidence_ratio = if leaves_coinciding_real { -reach } else { reach };
+    st.position = s.position;
+    st.offset = s.ng * s.error;
+    st.side = side;
     st.real_t_min = scene.materials[s.material as usize].self_shadow_bias;
 
     let mut roulette = Roulette {
@@ -90,6 +94,13 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
         plan_cone(scene, st, s, wo, roulette);
     }
     plan_continuation(scene, st, s, wo, roulette);
+}
+
+/// Whether the surface reached lies in the plane of the one that the ray has left, as far as their errors tell.
+fn coincides(st: &PathState, s: &Surface, distance: f32) -> bool {
+    let error2 = dot3(st.offset, st.offset);
+    let errors = 2.0 * (error2 * (1.0 + st.coincidence_ratio) + safe_sqrt(error2) * s.error);
+    dot3(st.direction, st.offset).abs() * distance <= errors
 }
 
 fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: f32) {
@@ -279,6 +290,7 @@ fn plan_continuation(
         st.pending |= PENDING_DIFFERENCE;
         st.difference_position = st.position;
         st.difference_offset = st.offset;
+        st.difference_coincidence_ratio = st.coincidence_ratio;
         st.difference_t_min = st.real_t_min;
         st.difference_depth = st.depth;
         st.difference_direction = b.wi;

@@ -137,7 +137,9 @@ fn sliver_table() -> Primitive {
 }
 
 fn slivers_lose_nothing(backend: BackendChoice) {
-    let scene = still_life();
+    let mut scene = still_life();
+    // With one light only, the choice of lights does not depend on how many vertices the scene has.
+    scene.environment = None;
     let with_table = |primitive: Primitive| {
         let mut scene = scene.clone();
         let primitive = Arc::new(primitive);
@@ -148,11 +150,11 @@ fn slivers_lose_nothing(backend: BackendChoice) {
     };
     let (rms, bias) = deviation(&with_table(sliver_table()), &scene, backend);
     println!("table of slivers: rms {rms:.1e}, mean {bias:+.1e}");
-    assert!(rms < 0.02 && bias.abs() < 2e-3, "{rms} {bias}");
+    assert!(rms < 5e-3 && bias.abs() < 1e-3, "{rms} {bias}");
     let mut torn = sliver_table();
     torn.triangles.drain(10..14);
     let (rms, _) = deviation(&with_table(torn), &scene, backend);
-    assert!(rms > 0.02, "control: a missing part shows: {rms}");
+    assert!(rms > 8e-3, "control: a missing part shows: {rms}");
 }
 
 /// A white world seen from a millimetre above its table: nothing may show.
@@ -258,6 +260,11 @@ fn coincident_sheets_do_not_fight(backend: BackendChoice) {
     println!("coincident sheet: {inside} pixels inside, {differing} differ from the lifted one");
     assert!(inside > 100);
     assert_eq!((differing, speckles), (0, 0));
+    let brightness = |lift_m: f64| block_means(&render(&sheets(lift_m), backend).picture());
+    let (touching, lifted) = (brightness(0.0), brightness(1e-4));
+    for (i, (a, b)) in touching.iter().zip(&lifted).enumerate() {
+        assert!((a - b).abs() < 0.02, "block {i}: {a} in the plane, {b} above it");
+    }
     let below = mask(render(&sheets(-1e-3), backend).film());
     assert!(below.iter().all(|&m| m == 0.0), "control: under the table it is hidden");
 }

@@ -11,6 +11,7 @@ const RADIUS_M: f64 = 0.25;
 const HEIGHT_M: f64 = 0.55;
 /// Points per pixel side at which the analytic difference is averaged.
 const SUBSAMPLES: u32 = 4;
+const RINGS: usize = 3;
 
 /// The camera looks straight down; the sphere is too wide for the middle of the picture, which is left out.
 fn black_sphere() -> Scene {
@@ -43,7 +44,7 @@ translation = [0, {HEIGHT_M}, 0]
 material = {{ base_color = [0, 0, 0], specular = 0.0 }}
 
 [render]
-rays_per_pixel = 64
+rays_per_pixel = 200
 max_bounces = 1
 "#
     ))
@@ -64,13 +65,13 @@ fn analytic(pixel: u32) -> f64 {
 
 /// Means over rings about the axis of the difference over its analytic value; pixels whose rays can meet the sphere are left out.
 fn rings(renderer: &Renderer) -> Vec<f64> {
-    let mut sums = vec![(0.0, 0.0); 4];
+    let mut sums = vec![(0.0, 0.0); RINGS];
     for (pixel, value) in renderer.picture().linear.iter().enumerate() {
         let (x, y) = (pixel as f64 % 32.0 - 15.5, (pixel / 32) as f64 - 15.5);
         if renderer.film().pixels[pixel].m > 0 {
             continue;
         }
-        let ring = ((x.hypot(y) - 5.0) / 5.0).clamp(0.0, 3.0) as usize;
+        let ring = ((x.hypot(y) - 5.0) / 5.0).clamp(0.0, RINGS as f64 - 1.0) as usize;
         sums[ring].0 += grey(*value) / analytic(pixel as u32);
         sums[ring].1 += 1.0;
     }
@@ -86,7 +87,7 @@ fn a_black_sphere_takes_its_form_factor(backend: BackendChoice) {
             rings(&render(&scene, backend))
         })
         .collect();
-    for ring in 0..4 {
+    for ring in 0..RINGS {
         let ratios: Vec<f64> = seeds.iter().map(|s| s[ring]).collect();
         let m = mean(&ratios);
         let error =
@@ -100,7 +101,7 @@ fn a_black_sphere_takes_its_form_factor(backend: BackendChoice) {
             (m - 1.0).abs() < 5.0 * error + 1e-4,
             "ring {ring}: {m} +- {error}"
         );
-        assert!(error < 2e-3, "the error is known well enough: {error}");
+        assert!(error < 5e-3, "the error is known well enough: {error}");
     }
     let mut lower = scene.clone();
     for object in &mut lower.objects {

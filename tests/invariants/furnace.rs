@@ -99,7 +99,8 @@ material = { base_color = [1, 1, 1], specular = 0.0 }
 
 /// Share of light from everywhere that glTF's rough surface sends to a viewer at this cosine: glTF 2.0, appendix B, in f64.
 ///
-/// The specular part is summed over half vectors, distributed as D(h) cos(h): tan^2 = alpha^2 u / (1 - u).
+/// The specular part is summed over half vectors, distributed as D(h) cos(h): tan^2 = alpha^2 u / (1 - u) with u = 1 - v^2, which takes
+/// the root singularity at the horizon away.
 fn directional_albedo(cos: f64, roughness: f64, base: f64, metallic: f64) -> f64 {
     const STEPS: usize = 600;
     let alpha2 = roughness.powi(4);
@@ -116,13 +117,14 @@ fn directional_albedo(cos: f64, roughness: f64, base: f64, metallic: f64) -> f64
     for i in 0..STEPS {
         for j in 0..STEPS {
             let (u, phi) = (fraction(i), TAU * fraction(j));
-            let z = 1.0 / (1.0 + alpha2 * u / (1.0 - u)).sqrt();
+            let v = u;
+            let z = v / (v * v + alpha2 * (1.0 - v * v)).sqrt();
             let h = spherical(z, phi);
             let oh = wo.dot(h);
             let wi = h * (2.0 * oh) - wo;
             if oh > 0.0 && wi.z > 0.0 {
                 let f = fresnel(oh, f0);
-                specular += f * masking(cos) * masking(wi.z) * oh / (cos * z);
+                specular += 2.0 * v * f * masking(cos) * masking(wi.z) * oh / (cos * z);
             }
             // Cosine-weighted directions of the diffuse part under the interface.
             let wi = spherical((1.0 - u).sqrt(), phi);

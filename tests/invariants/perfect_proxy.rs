@@ -25,7 +25,7 @@ fn boards() -> Scene {
     }
     text += r#"
 [lens]
-aperture_radius_m = 0.06
+aperture_radius_m = 0.1
 focus_distance_m = 1.5
 
 [[virtual]]

@@ -87,8 +87,8 @@ material = {{ base_color = [0.6, 0.6, 0.6], specular = 0.0 }}
 
 [[virtual]]
 shape = "box"
-size = [0.1, 0.1, 0.1]
-translation = [0.1, 0.05, 0]
+size = [0.2, 0.2, 0.2]
+translation = [0.1, 0.1, 0]
 
 [[light]]
 kind = "directional"
@@ -161,9 +161,9 @@ fn pixels_off_the_proxy_are_the_photograph(backend: BackendChoice) {
     let (mut off, mut untraced) = (0, 0);
     for pixel in 0..WIDTH * HEIGHT {
         let i = pixel as usize;
-        // The proxy lies within 0.71 m of the origin, the box within 0.2 m of it and below y = 0.1.
+        // The proxy lies within 0.71 m of the origin, the box within 0.3 m of it and below y = 0.2.
         let far = |height| distance_on_plane(&scene, pixel, height, glam::DVec3::ZERO) > 0.75;
-        if far(0.0) && far(0.1) {
+        if far(0.0) && far(0.2) {
             assert!(!changed[i], "pixel {pixel}");
             off += 1;
         }
@@ -174,7 +174,7 @@ fn pixels_off_the_proxy_are_the_photograph(backend: BackendChoice) {
     }
     let touched = changed.iter().filter(|&&c| c).count();
     println!("{off} pixels off the proxy, {untraced} known to be untraced, {touched} changed");
-    assert!(off > 50 && untraced > 10 && touched > 50, "control: there are all");
+    assert!(off > 50 && untraced > 10 && touched > 40, "control: there are all");
 }
 
 /// At one bounce the sun reaches the proxy everywhere but in the shadow, so the difference elsewhere is exactly 0.
@@ -182,15 +182,15 @@ fn lit_pixels_outside_the_shadow_are_the_photograph(backend: BackendChoice) {
     let scene = small_stage(1);
     let renderer = render(&scene, backend);
     let changed = changed(&renderer);
-    let box_centre = glam::DVec3::new(0.1, 0.05, 0.0);
+    let box_centre = glam::DVec3::new(0.1, 0.1, 0.0);
     // Along the light from the box's centre to the table.
-    let shadow_centre = box_centre + glam::DVec3::new(-0.5, -1.0, 0.0) * 0.05;
+    let shadow_centre = box_centre + glam::DVec3::new(-0.5, -1.0, 0.0) * 0.1;
     // Half the box's diagonal, drawn out by the slope of the light; half a pixel.
-    let reach = 0.0866 * 1.25_f64.sqrt() + 0.02;
+    let reach = 0.1733 * 1.25_f64.sqrt() + 0.02;
     let (mut outside, mut inside) = (0, 0);
     for pixel in 0..WIDTH * HEIGHT {
         let near = |height: f64, centre| distance_on_plane(&scene, pixel, height, centre) < reach;
-        let sees_box = [0.0, 0.05, 0.1].iter().any(|&h| near(h, box_centre));
+        let sees_box = [0.0, 0.1, 0.2].iter().any(|&h| near(h, box_centre));
         if sees_box || near(0.0, shadow_centre) {
             inside += usize::from(changed[pixel as usize]);
         } else {
@@ -199,7 +199,7 @@ fn lit_pixels_outside_the_shadow_are_the_photograph(backend: BackendChoice) {
         }
     }
     println!("{inside} pixels changed by the box and its shadow, {outside} outside");
-    assert!(inside > 8 && outside > 300, "control: there are both");
+    assert!(inside > 15 && outside > 300, "control: there are both");
 }
 
 on_each_backend!(

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use mixray::film::{Film, Picture};
-use mixray::packed::PackedScene;
 use mixray::renderer::{Budget, Renderer, RendererOptions};
 use mixray::scene::{BackendChoice, EncodedPhoto, Photo, Scene};
 
@@ -100,10 +99,6 @@ pub fn mask(film: &Film) -> Vec<f64> {
         .iter()
         .map(|p| f64::from(p.m) / f64::from(p.n.max(1)))
         .collect()
-}
-
-pub fn is_reachable(packed: &PackedScene, pixel: usize) -> bool {
-    packed.pixels[pixel].flags & mixray::packed::PIXEL_OUT_OF_REACH == 0
 }
 
 /// Mean of the three channels.
