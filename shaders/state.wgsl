@@ -104,6 +104,7 @@ struct PathState {
     coincidence_ratio: f32,
     difference_coincidence_ratio: f32,
     mask: u32,
+    indirect: u32,
     rays: RayCounts,
 }
 

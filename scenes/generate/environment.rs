@@ -80,3 +80,40 @@ pub fn write_exr(map: &Map, path: &Path) -> Result<(), Box<dyn Error>> {
     Image::from_layer(layer).write().to_file(path)?;
     Ok(())
 }
+
+/// A room seen from its table: a tall window with bars to the left, a lamp to the right behind the camera, dim walls.
+pub fn room_with_window() -> Map {
+    const WALL_DISTANCE_M: f64 = 1.3;
+    let lamp = DVec3::new(0.80, 0.55, 0.45).normalize();
+    Map::new(256, |direction| {
+        let up = direction.y;
+        let walls = DVec3::new(0.13, 0.12, 0.105) * (0.75 + 0.5 * up);
+        let ceiling = DVec3::new(0.24, 0.23, 0.22);
+        let floor = DVec3::new(0.10, 0.075, 0.055);
+        let room = walls
+            .lerp(ceiling, falling(-0.62, -0.58, -up))
+            .lerp(floor, falling(-0.45, -0.35, up));
+        let away_deg = direction.angle_between(lamp).to_degrees();
+        let lamp_light = DVec3::new(4.0, 2.8, 1.7) * falling(9.0, 14.0, away_deg);
+        room + lamp_light
+            + window(
+                direction * (WALL_DISTANCE_M / -direction.x.min(-1e-9)),
+                direction,
+            )
+    })
+}
+
+/// Light from outside, through a point of the wall on the left that is given in metres.
+fn window(place: DVec3, direction: DVec3) -> DVec3 {
+    if direction.x >= -1e-6 {
+        return DVec3::ZERO;
+    }
+    let pane = |x: f64, low: f64, high: f64| {
+        falling(-low - 0.01, -low + 0.01, -x) * falling(high - 0.01, high + 0.01, x)
+    };
+    let across = pane(place.z, -0.40, 0.27) + pane(place.z, 0.34, 1.01);
+    let upward = pane(place.y, 0.15, 0.80) + pane(place.y, 0.87, 1.75);
+    let sky = DVec3::new(10.2, 11.0, 11.8);
+    let trees = DVec3::new(4.2, 5.0, 3.7);
+    trees.lerp(sky, falling(-0.6, -0.3, -place.y)) * across * upward
+}

@@ -2,8 +2,12 @@
 //!
 //! `cargo run --release --example generate_scenes [NAME...]`, names of scenes; all of them without one.
 
+mod demo;
 mod environment;
+mod glb;
+mod mesh;
 mod photograph;
+mod texture;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -16,6 +20,9 @@ const TEST_PHOTO_RAYS: u32 = 256;
 fn main() -> Result<(), Box<dyn Error>> {
     let names: Vec<String> = std::env::args().skip(1).collect();
     let wanted = |name: &str| names.is_empty() || names.iter().any(|n| n == name);
+    if wanted("demo") {
+        demo::generate(&folder("demo"))?;
+    }
     if wanted("room") {
         photograph_proxy(&folder("room"))?;
     }

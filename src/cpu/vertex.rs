@@ -22,7 +22,7 @@ const ROULETTE_GAIN: f32 = 4.0;
 /// than the floor's probability.
 const CONE_ROULETTE_GAIN: f32 = 8.0;
 const CONE_ROULETTE_FLOOR: f32 = 0.1;
-const RECURSION_ROULETTE_GAIN: f32 = 4.0;
+const RECURSION_ROULETTE_GAIN: f32 = 1.0;
 const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
 /// A light's own surface must not block it: shadow rays end this much short of it, relative to the distance and in position errors.
 const SHADOW_SHORTEN: f32 = 2e-5;
@@ -70,7 +70,11 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     };
     let leaves_coinciding_real = side == 1 && st.side == 0 && coincides(st, s, distance);
     let reach = 1.0 + COINCIDENCE * distance / s.error;
-    st.coincidence_ratio = if leaves_coinciding_real { -reach } else { reach };
+    st.coincidence_ratio = if leaves_coinciding_real {
+        -reach
+    } else {
+        reach
+    };
     st.position = s.position;
     st.offset = s.ng * s.error;
     st.side = side;
@@ -86,7 +90,7 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
         roulette.cone = (CONE_ROULETTE_GAIN * strength * reach).clamp(CONE_ROULETTE_FLOOR, 1.0);
         if bsdf_is_lambertian(s) {
             roulette.bsdf =
-                (RECURSION_ROULETTE_GAIN * strength * reach).clamp(RECURSION_ROULETTE_FLOOR, 1.0);
+                (RECURSION_ROULETTE_GAIN * strength).clamp(RECURSION_ROULETTE_FLOOR, 1.0);
         }
     }
     next_event(scene, st, s, wo, roulette);

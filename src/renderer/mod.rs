@@ -220,7 +220,12 @@ impl Renderer {
         while done < end && !self.nothing_to_trace() {
             let step = done.clamp(1, MAX_PASS_SAMPLES).min(end - done);
             let cancel = Cancel::new(cancelled, deadline);
-            self.run_pass(Pass::Main { end: first + done + step }, &cancel)?;
+            self.run_pass(
+                Pass::Main {
+                    end: first + done + step,
+                },
+                &cancel,
+            )?;
             if cancel.is_cancelled() {
                 break;
             }

@@ -133,8 +133,14 @@ fn sunny() -> Environment {
 
 fn sunny_environment(backend: BackendChoice) {
     for (name, material) in [
-        ("sun, diffuse", "base_color = [0.7, 0.6, 0.5], specular = 0.0"),
-        ("sun, semi-gloss", "base_color = [0.7, 0.6, 0.5], roughness = 0.4"),
+        (
+            "sun, diffuse",
+            "base_color = [0.7, 0.6, 0.5], specular = 0.0",
+        ),
+        (
+            "sun, semi-gloss",
+            "base_color = [0.7, 0.6, 0.5], roughness = 0.4",
+        ),
     ] {
         let mut scene = room(&format!("{}{RED_BOX}{METAL_BALL}", table_of(material)));
         scene.environment = Some(sunny());
@@ -230,7 +236,9 @@ size = [0.2, 0.8, 0.2]
 translation = [-0.25, 0.4, 0.5]
 material = { base_color = [0.4, 0.6, 0.3], roughness = 0.5 }
 "#;
-    let mut scene = room(&format!("{TABLE}{WALL}{post}{LAMP}{SKY}{RED_BOX}{METAL_BALL}"));
+    let mut scene = room(&format!(
+        "{TABLE}{WALL}{post}{LAMP}{SKY}{RED_BOX}{METAL_BALL}"
+    ));
     scene.lens.aperture_radius_m = 0.05;
     scene.lens.focus_distance_m = 2.6;
     agree("real post, defocused", &scene, &[1, 2, 4], backend);
@@ -273,7 +281,10 @@ fn virtual_glass(backend: BackendChoice) {
             "rough tinted glass",
             "roughness = 0.3, transmission = 1.0, attenuation_color = [0.5, 0.9, 0.7], attenuation_distance_m = 0.2",
         ),
-        ("thin glass", "roughness = 0.0, transmission = 0.9, thin_walled = true"),
+        (
+            "thin glass",
+            "roughness = 0.0, transmission = 0.9, thin_walled = true",
+        ),
     ] {
         let ball = METAL_BALL.replace(
             "base_color = [0.9, 0.8, 0.6], metallic = 1.0, roughness = 0.4",

@@ -4,9 +4,7 @@
 use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
-use mixray::scene::{
-    BackendChoice, Environment, EnvironmentMap, LightKind, Primitive, Scene,
-};
+use mixray::scene::{BackendChoice, Environment, EnvironmentMap, LightKind, Primitive, Scene};
 
 use crate::support::*;
 
@@ -91,7 +89,11 @@ fn scale_and_place_do_not_matter(backend: BackendChoice) {
         (1.0, -1e6),
         (1e-3, 1e3),
     ] {
-        let moved = placed(&scene, scale, DVec3::new(offset, 0.7 * offset, -0.3 * offset));
+        let moved = placed(
+            &scene,
+            scale,
+            DVec3::new(offset, 0.7 * offset, -0.3 * offset),
+        );
         let (rms, bias) = deviation(&moved, &scene, backend);
         println!("scaled by {scale:e}, moved by {offset:e} m: rms {rms:.1e}, mean {bias:+.1e}");
         assert!(rms < 0.02, "{rms}");
@@ -203,7 +205,10 @@ max_bounces = 128
     }
     let means = over_seeds(&furnace(0.99, 1e-3), backend, 0..16);
     let control = Difference::between(&means, &ones);
-    assert!(!control.is_none(), "control: 1% of absorption shows: {control}");
+    assert!(
+        !control.is_none(),
+        "control: 1% of absorption shows: {control}"
+    );
 }
 
 /// A virtual sheet exactly in the plane of a tilted real one, up to the rounding of their vertices.
@@ -263,10 +268,16 @@ fn coincident_sheets_do_not_fight(backend: BackendChoice) {
     let brightness = |lift_m: f64| block_means(&render(&sheets(lift_m), backend).picture());
     let (touching, lifted) = (brightness(0.0), brightness(1e-4));
     for (i, (a, b)) in touching.iter().zip(&lifted).enumerate() {
-        assert!((a - b).abs() < 0.02, "block {i}: {a} in the plane, {b} above it");
+        assert!(
+            (a - b).abs() < 0.02,
+            "block {i}: {a} in the plane, {b} above it"
+        );
     }
     let below = mask(render(&sheets(-1e-3), backend).film());
-    assert!(below.iter().all(|&m| m == 0.0), "control: under the table it is hidden");
+    assert!(
+        below.iter().all(|&m| m == 0.0),
+        "control: under the table it is hidden"
+    );
 }
 
 /// A glass box whose base lies in the table's plane; `table` is the albedo.
@@ -285,9 +296,9 @@ radiance = [1, 1, 1]
 
 [[real]]
 shape = "quad"
-corner = [-300, 0, 300]
-edge_u = [600, 0, 0]
-edge_v = [0, 0, -600]
+corner = [-2, 0, 2]
+edge_u = [4, 0, 0]
+edge_v = [0, 0, -4]
 material = {{ base_color = [{table}, {table}, {table}], specular = 0.0 }}
 
 [[virtual]]
@@ -331,7 +342,10 @@ fn glass_on_a_table_leaks_no_light(backend: BackendChoice) {
     assert!(leak.abs() < 1e-6, "{leak}");
     let mut without_table = on_table;
     without_table.objects.retain(|o| o.name != "quad");
-    assert!(brightness(&without_table) > 0.05, "control: without a table it shines");
+    assert!(
+        brightness(&without_table) > 0.05,
+        "control: without a table it shines"
+    );
 }
 
 /// In a furnace a clear box on a white table is invisible, whether it touches the table, hovers or has sunk in a little.

@@ -90,8 +90,7 @@ fn a_black_sphere_takes_its_form_factor(backend: BackendChoice) {
     for ring in 0..RINGS {
         let ratios: Vec<f64> = seeds.iter().map(|s| s[ring]).collect();
         let m = mean(&ratios);
-        let error =
-            (ratios.iter().map(|x| (x - m) * (x - m)).sum::<f64>() / (15.0 * 16.0)).sqrt();
+        let error = (ratios.iter().map(|x| (x - m) * (x - m)).sum::<f64>() / (15.0 * 16.0)).sqrt();
         println!(
             "form factor, ring {ring}: relative error {:+.2e} +- {error:.1e}",
             m - 1.0

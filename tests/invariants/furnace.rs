@@ -31,7 +31,7 @@ max_bounces = 64
 
 fn ball(material: &str) -> String {
     format!(
-        "[[virtual]]\nshape = \"sphere\"\nsegments = 64\nscale = 0.5\nmaterial = {{ {material} }}\n"
+        "[[virtual]]\nshape = \"sphere\"\nsegments = 160\nscale = 0.5\nmaterial = {{ {material} }}\n"
     )
 }
 
@@ -90,7 +90,7 @@ material = { base_color = [1, 1, 1], specular = 0.0 }
         let mut scene = furnace(&objects);
         scene.settings.rays_per_pixel = 32;
         let ones = vec![vec![1.0; 30]; 2];
-        let means = over_seeds(&scene, backend, 0..16);
+        let means = over_seeds(&scene, backend, 0..48);
         let difference = Difference::between(&means, &ones);
         println!("furnace, {name}: {difference}");
         assert_eq!(difference.is_none(), vanishes, "{name}: {difference}");
@@ -189,7 +189,10 @@ fn rough_surfaces_show_their_single_scattering_albedo(backend: BackendChoice) {
         }
     }
     println!("furnace, rough: largest relative error {worst:.1e}");
-    let (shown, error) = shown_albedo(&tilted_quad(50.0, "metallic = 1.0, roughness = 0.63"), backend);
+    let (shown, error) = shown_albedo(
+        &tilted_quad(50.0, "metallic = 1.0, roughness = 0.63"),
+        backend,
+    );
     let expected = directional_albedo(50.0_f64.to_radians().cos(), 0.6, 1.0, 1.0);
     assert!(
         (shown - expected).abs() > 5.0 * error + 2e-4,

@@ -134,7 +134,12 @@ fn passes(aperture: Aperture, rotation_deg: f64, x: f64, y: f64) -> bool {
 }
 
 /// The mask of an emitter behind the focus plane: its sharp image moved by every lens point, in f64.
-fn expected_mask(distance_m: f64, focus_distance_m: f64, aperture: Aperture, rotation_deg: f64) -> Vec<f64> {
+fn expected_mask(
+    distance_m: f64,
+    focus_distance_m: f64,
+    aperture: Aperture,
+    rotation_deg: f64,
+) -> Vec<f64> {
     const GRID: i32 = 120;
     let scale = APERTURE_M * FX * (1.0 / focus_distance_m - 1.0 / distance_m);
     let centre = 0.5 * f64::from(SIDE_PX);

@@ -101,7 +101,13 @@ max_bounces = {max_bounces}
 "#
     ));
     let linear = (0..WIDTH * HEIGHT)
-        .map(|i| [0.2 + (i % 7) as f32 * 0.05, 0.3, 0.4 + (i % 5) as f32 * 0.03])
+        .map(|i| {
+            [
+                0.2 + (i % 7) as f32 * 0.05,
+                0.3,
+                0.4 + (i % 5) as f32 * 0.03,
+            ]
+        })
         .collect();
     scene.photo = Some(photo_of(WIDTH, HEIGHT, linear));
     scene
@@ -174,7 +180,10 @@ fn pixels_off_the_proxy_are_the_photograph(backend: BackendChoice) {
     }
     let touched = changed.iter().filter(|&&c| c).count();
     println!("{off} pixels off the proxy, {untraced} known to be untraced, {touched} changed");
-    assert!(off > 50 && untraced > 10 && touched > 40, "control: there are all");
+    assert!(
+        off > 50 && untraced > 10 && touched > 40,
+        "control: there are all"
+    );
 }
 
 /// At one bounce the sun reaches the proxy everywhere but in the shadow, so the difference elsewhere is exactly 0.

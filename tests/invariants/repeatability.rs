@@ -33,7 +33,11 @@ material = {{ base_color = [0.8, 0.5, 0.3], roughness = 0.3 }}
 fn advance_by(renderer: &mut Renderer, rays_per_pixel: u64) {
     let pixels = u64::from(renderer.film().width) * u64::from(renderer.film().height);
     renderer
-        .advance(Budget::Rays(rays_per_pixel * pixels), &|| false, &mut |_| ())
+        .advance(
+            Budget::Rays(rays_per_pixel * pixels),
+            &|| false,
+            &mut |_| (),
+        )
         .expect("the render goes on");
 }
 
@@ -72,7 +76,11 @@ fn passes_do_not_matter(backend: BackendChoice) {
         }
         let mut unfinished = renderer(&scene, backend, RendererOptions::default());
         advance_by(&mut unfinished, u64::from(RAYS) - 1);
-        assert_ne!(whole, bits(&unfinished.picture()), "control: a ray fewer shows");
+        assert_ne!(
+            whole,
+            bits(&unfinished.picture()),
+            "control: a ray fewer shows"
+        );
     }
 }
 
@@ -80,7 +88,11 @@ fn passes_do_not_matter(backend: BackendChoice) {
 fn ulps(a: f32, b: f32) -> u64 {
     let ordered = |x: f32| {
         let bits = i64::from(x.to_bits() as i32);
-        if bits < 0 { i64::from(i32::MIN) - bits } else { bits }
+        if bits < 0 {
+            i64::from(i32::MIN) - bits
+        } else {
+            bits
+        }
     };
     (ordered(a) - ordered(b)).unsigned_abs()
 }
@@ -126,7 +138,10 @@ fn ranges_merge_to_the_whole(backend: BackendChoice) {
             assert!(worst <= 2, "{worst} ulp");
         }
         let part = range(0, RAYS - 1);
-        assert!(largest_ulps(&whole, &part) > 1000, "control: a ray fewer shows");
+        assert!(
+            largest_ulps(&whole, &part) > 1000,
+            "control: a ray fewer shows"
+        );
     }
 }
 
