@@ -10,7 +10,7 @@ import package::lights::env_pdf;
 import package::math::dot3;
 import package::sampler::sample_4d;
 import package::state::{
-    DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_REAL,
+    COINCIDENCE, DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_REAL,
     PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_REAL,
     REQUEST_CLOSEST_VIRTUAL, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
     REQUEST_VIRTUAL_THEN_REAL, STAGE_DIFFERENCE_BSDF, STAGE_DIFFERENCE_CONE, STAGE_DIFFERENCE_SHADOW, STAGE_DONE,
@@ -19,8 +19,6 @@ import package::state::{
 import package::surface::{Surface, surface_at};
 import package::trace::Hit;
 import package::vertex::shade_vertex;
-
-const COINCIDENCE: f32 = 1e-5;
 
 fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
     var st = path_state(pixel, index);
@@ -152,6 +150,7 @@ fn resume(st: ptr<function, PathState>) {
             (*st).direction = (*st).next_direction;
             (*st).density = (*st).next_density;
             (*st).throughput = (*st).next_throughput;
+            (*st).medium = (*st).next_medium;
             if (*st).density != DELTA_DENSITY { (*st).indirect = 1u; }
             (*st).t_max = FAR;
             if (*st).mode == MODE_DIFFERENCE {
@@ -166,7 +165,7 @@ fn resume(st: ptr<function, PathState>) {
         if ((*st).pending & PENDING_REAL) != 0u {
             (*st).pending &= ~PENDING_REAL;
             (*st).mode = MODE_REAL;
-            (*st).medium = NONE;
+            (*st).medium = (*st).real_medium;
             (*st).depth = (*st).real_depth;
             (*st).direction = (*st).real_direction;
             (*st).density = (*st).real_density;
@@ -179,9 +178,10 @@ fn resume(st: ptr<function, PathState>) {
             if ((*st).pending & PENDING_DIFFERENCE) != 0u {
                 (*st).pending &= ~PENDING_DIFFERENCE;
                 (*st).mode = MODE_DIFFERENCE;
-                (*st).medium = NONE;
+                (*st).medium = (*st).difference_medium;
                 (*st).position = (*st).difference_position;
                 (*st).offset = (*st).difference_offset;
+                (*st).coincidence_ratio = (*st).difference_coincidence_ratio;
                 (*st).side = 0u;
                 (*st).real_t_min = (*st).difference_t_min;
                 (*st).direction = (*st).difference_direction;
@@ -228,6 +228,7 @@ fn paper_behind(st: ptr<function, PathState>) {
         (*st).real_direction = (*st).direction;
         (*st).real_density = (*st).density;
         (*st).real_throughput = (*st).throughput;
+        (*st).real_medium = (*st).medium;
         (*st).real_depth = (*st).depth;
     } else {
         (*st).mode = MODE_REAL;
@@ -305,6 +306,7 @@ fn split_difference(st: ptr<function, PathState>) {
         (*st).real_direction = (*st).direction;
         (*st).real_density = (*st).density;
         (*st).real_throughput = -(*st).throughput;
+        (*st).real_medium = (*st).medium;
         (*st).real_depth = (*st).depth + 1u;
     }
     (*st).mode = MODE_MIXED;

@@ -18,9 +18,6 @@ use crate::light::lights::env_pdf;
 use crate::material::{Surface, bsdf_albedo, surface_at};
 use crate::packed::{FRAME_AOVS, FRAME_ENV_DRAWN, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene};
 
-/// A virtual hit counts as nearer within this relative distance, so that a base lying in the table's plane covers the table.
-const COINCIDENCE: f32 = 1e-5;
-
 /// Sets up the primary ray. `real_pass` renders the real radiance and the mask alone, for pixels that need Ir.
 pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool) -> PathState {
     let mut st = PathState::new(pixel, index);
@@ -167,6 +164,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.direction = st.next_direction;
             st.density = st.next_density;
             st.throughput = st.next_throughput;
+            st.medium = st.next_medium;
             st.indirect = st.indirect || st.density != DELTA_DENSITY;
             st.t_max = f32::INFINITY;
             if st.mode == MODE_DIFFERENCE {
@@ -185,7 +183,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
         if st.pending & PENDING_REAL != 0 {
             st.pending &= !PENDING_REAL;
             st.mode = MODE_REAL;
-            st.medium = NONE;
+            st.medium = st.real_medium;
             st.depth = st.real_depth;
             st.direction = st.real_direction;
             st.density = st.real_density;
@@ -197,9 +195,10 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
         if st.pending & PENDING_DIFFERENCE != 0 {
             st.pending &= !PENDING_DIFFERENCE;
             st.mode = MODE_DIFFERENCE;
-            st.medium = NONE;
+            st.medium = st.difference_medium;
             st.position = st.difference_position;
             st.offset = st.difference_offset;
+            st.coincidence_ratio = st.difference_coincidence_ratio;
             st.side = 0;
             st.real_t_min = st.difference_t_min;
             st.direction = st.difference_direction;
@@ -254,6 +253,7 @@ fn paper_behind(scene: &PackedScene, st: &mut PathState) {
         st.real_direction = st.direction;
         st.real_density = st.density;
         st.real_throughput = st.throughput;
+        st.real_medium = st.medium;
         st.real_depth = st.depth;
     } else {
         st.mode = MODE_REAL;
@@ -353,6 +353,7 @@ fn split_difference(scene: &PackedScene, st: &mut PathState) {
         st.real_direction = st.direction;
         st.real_density = st.density;
         st.real_throughput = -st.throughput;
+        st.real_medium = st.medium;
         st.real_depth = st.depth + 1;
     }
     st.mode = MODE_MIXED;
