@@ -6,7 +6,6 @@ import package::bindings::{
 import package::environment::{env_direction_pdf, env_sample};
 import package::math::{cross3, dot3, length3, safe_sqrt};
 import package::state::FAR;
-@if(textures) import package::surface::triangle_emission;
 
 struct LightSample {
     direction: vec3<f32>,
@@ -86,11 +85,7 @@ fn sample_area_light(light: Light, position: vec3<f32>, u0: f32, u1: f32) -> Lig
     let direction = to_light / distance;
     let pdf = area_pdf(light, direction, distance);
     if pdf <= 0.0 { return no_light(); }
-    var radiance = light.radiance.xyz;
-    @if(textures) {
-        if light.triangle != NONE { radiance = triangle_emission(light.triangle, a, b); }
-    }
-    return LightSample(direction, distance, radiance, pdf, false, light.side);
+    return LightSample(direction, distance, light.radiance.xyz, pdf, false, light.side);
 }
 
 @if(area_lights)

@@ -157,7 +157,7 @@ fn ray_into(st: ptr<function, PathState>, world: u32, t_max: f32) -> Ray {
     let offset = (*st).offset;
     let along = select(offset, -offset, dot3((*st).direction, offset) < 0.0);
     let origin = select((*st).position - along, (*st).position + along, world == (*st).side);
-    return Ray(origin, (*st).direction, select(0.0, (*st).real_t_min, world == WORLD_REAL), t_max, NONE);
+    return Ray(origin, select(0.0, (*st).real_t_min, world == WORLD_REAL), (*st).direction, t_max, NONE);
 }
 
 @if(alpha)

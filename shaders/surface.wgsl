@@ -210,7 +210,10 @@ fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
         }
     }
     var base_color = clamp(base.xyz, vec3<f32>(0.0), vec3<f32>(1.0));
-    let coverage = coverage_of(entry, base.w);
+    var coverage = 1.0;
+    @if(alpha) {
+        coverage = coverage_of(entry, base.w);
+    }
     var flags = entry.flags;
     @if(photo_albedo) {
         if (flags & MATERIAL_PHOTO_ALBEDO) != 0u {

@@ -12,6 +12,7 @@ use crate::packed::{self, PackedScene};
 /// The embedded modules: name and source.
 pub const MODULES: &[(&str, &str)] = &[
     ("bindings", include_str!("../../shaders/bindings.wgsl")),
+    ("bsdf", include_str!("../../shaders/bsdf.wgsl")),
     ("cones", include_str!("../../shaders/cones.wgsl")),
     (
         "contribution",
@@ -23,14 +24,19 @@ pub const MODULES: &[(&str, &str)] = &[
     ),
     ("estimator", include_str!("../../shaders/estimator.wgsl")),
     ("film", include_str!("../../shaders/film.wgsl")),
+    ("fresnel", include_str!("../../shaders/fresnel.wgsl")),
+    ("ggx", include_str!("../../shaders/ggx.wgsl")),
     ("kernels", include_str!("../../shaders/kernels.wgsl")),
     ("lanes", include_str!("../../shaders/lanes.wgsl")),
     ("lens", include_str!("../../shaders/lens.wgsl")),
     ("lights", include_str!("../../shaders/lights.wgsl")),
     ("math", include_str!("../../shaders/math.wgsl")),
+    ("normal", include_str!("../../shaders/normal.wgsl")),
     ("request", include_str!("../../shaders/request.wgsl")),
     ("sampler", include_str!("../../shaders/sampler.wgsl")),
     ("state", include_str!("../../shaders/state.wgsl")),
+    ("surface", include_str!("../../shaders/surface.wgsl")),
+    ("texture", include_str!("../../shaders/texture.wgsl")),
     ("trace", include_str!("../../shaders/trace.wgsl")),
     ("vertex", include_str!("../../shaders/vertex.wgsl")),
 ];
@@ -208,8 +214,17 @@ impl Composer {
         compiler
             .compile(&path(root)?)
             .map(|result| result.to_string())
-            .map_err(|error| shader_error(error.to_string()))
+            .map_err(|error| shader_error(without_colours(&error.to_string())))
     }
+}
+
+/// WESL paints its messages whether or not they go to a terminal.
+fn without_colours(text: &str) -> String {
+    let mut pieces = text.split("\u{1b}[");
+    let first = pieces.next().unwrap_or_default().to_owned();
+    pieces.fold(first, |plain, piece| {
+        plain + piece.split_once('m').map_or("", |(_, rest)| rest)
+    })
 }
 
 #[cfg(test)]
@@ -283,6 +298,10 @@ fn unused() -> u32 { return lights[0].kind; }
                 "@if(lense) const x = 1; @compute @workgroup_size(1) fn main() { }",
             )
             .compose("root", "main", &Features::default());
-        assert!(composed.is_err_and(|error| error.to_string().contains("lense")));
+        let message = composed.expect_err("refused").to_string();
+        assert!(
+            message.contains("lense") && !message.contains('\u{1b}'),
+            "{message}"
+        );
     }
 }

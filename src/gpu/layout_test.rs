@@ -196,6 +196,8 @@ fn constants_have_the_same_values_on_both_sides() {
         NONE,
         MAX_SPHERES,
         FRAME_ENV_DRAWN,
+        FRAME_AOVS,
+        FRAME_ALPHA,
         MATERIAL_LAMBERTIAN,
         MATERIAL_ALPHA_MASK,
         MATERIAL_ALPHA_BLEND,

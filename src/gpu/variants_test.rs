@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use wgpu::naga;
 
 use super::profile::KERNELS;
-use super::{Composer, Features, kernel::reflect_bindings, wavefront_test::composer};
+use super::{Composer, Features, kernel::reflect_bindings};
 
 /// Nothing on, everything on, each feature alone, all but each.
 fn variants() -> Vec<Features> {
@@ -48,7 +48,7 @@ fn bound(composer: &Composer, kernel: &str, features: &Features) -> BTreeSet<Str
 
 #[test]
 fn every_variant_is_valid() {
-    let composer = composer();
+    let composer = Composer::default();
     for features in variants() {
         for kernel in KERNELS {
             valid(&composer, kernel, &features);
@@ -58,7 +58,7 @@ fn every_variant_is_valid() {
 
 #[test]
 fn kernels_bind_what_they_use_and_no_more() {
-    let composer = composer();
+    let composer = Composer::default();
     let set = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
     let turn = bound(&composer, "kernel_turn", &Features::all());
     assert_eq!(turn, set(&["lanes_counters", "lanes_indirect"]));
@@ -84,7 +84,7 @@ fn a_specialised_kernel_lacks_the_other_estimator() {
             paper,
             ..Features::default()
         };
-        valid(&composer(), "kernel_accumulate", &features)
+        valid(&Composer::default(), "kernel_accumulate", &features)
     };
     assert!(accumulate(true).contains(".radiance_real"));
     assert!(!accumulate(false).contains(".radiance_real"));
@@ -93,7 +93,7 @@ fn a_specialised_kernel_lacks_the_other_estimator() {
 #[test]
 #[should_panic(expected = "no definition in scope")]
 fn an_invalid_variant_is_noticed() {
-    let broken = composer().with_module(
+    let broken = Composer::default().with_module(
         "request",
         "import package::state::PathState;
         fn answer(path: ptr<function, PathState>, thread: u32) { @if(clearcoat) { _ = not_there(thread); } }",

@@ -14,7 +14,8 @@ use super::profile::{
 };
 use super::{Composer, Features, GpuDevice, GpuError, SceneBuffers, SceneParts};
 use crate::film::Film;
-use crate::packed::PackedScene;
+use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
+use crate::renderer::{Cancel, Pass, RayTotals};
 
 /// Samples of one pixel in a batch at most, so that a batch has pixels enough to sum in parallel.
 const MOST_SAMPLES: u32 = 256;
@@ -161,8 +162,8 @@ impl GpuBackend {
     }
 
     /// Takes the samples of `work` and adds them to the film; of the real pass if `real_pass`. `keep_going` is told after each batch of
-    /// pixels how many are done and ends the pass by answering false. Returns the rays traced: primary, mixed, real, mixed shadow,
-    /// real shadow.
+    /// pixels how many are done and ends the pass by answering false. `rays` grows by the rays traced: primary, mixed, real, mixed
+    /// shadow, real shadow.
     ///
     /// Whatever the outcome, every pixel of the film has taken all of its samples of this pass or none.
     ///
@@ -173,24 +174,57 @@ impl GpuBackend {
         film: &mut Film,
         real_pass: bool,
         work: &[PixelWork],
+        rays: &mut [u64; 5],
         keep_going: &dyn Fn(u64) -> bool,
-    ) -> Result<[u64; 5], GpuError> {
-        let mut rays = [0; 5];
+    ) -> Result<(), GpuError> {
         let mut rest = work;
         while !rest.is_empty() {
             let lanes = self.pacer.lanes();
             let lanes = self.prepare(lanes, !film.guides.is_empty())?;
             let (now, later) = rest.split_at(pixels_that_fit(rest, lanes));
-            let traced = self.render_pixels(film, real_pass, now)?;
-            for (sum, n) in rays.iter_mut().zip(traced) {
-                *sum += n;
-            }
+            let at_once = (lanes / now.len()).clamp(1, MOST_SAMPLES as usize) as u32;
+            self.render_pixels(film, real_pass, now, at_once, rays)?;
             rest = later;
             if !keep_going(now.len() as u64) {
                 break;
             }
         }
-        Ok(rays)
+        Ok(())
+    }
+
+    /// Renders a pass into the film, as [`crate::cpu::render::render_pass`] does; `rays` grows by the rays traced.
+    ///
+    /// # Errors
+    /// As [`GpuBackend::render`].
+    pub fn render_pass(
+        &mut self,
+        scene: &PackedScene,
+        film: &mut Film,
+        pass: Pass,
+        cancel: &Cancel<'_>,
+        rays: &mut RayTotals,
+    ) -> Result<(), GpuError> {
+        let (real_pass, work) = match pass {
+            Pass::Main { end } => (false, main_work(&scene.pixels, film, end)),
+            Pass::Real { everywhere } => (true, real_work(film, everywhere)),
+        };
+        if cancel.is_cancelled() {
+            return Ok(());
+        }
+        let mut kinds = [0; 5];
+        let outcome = self.render(film, real_pass, &work, &mut kinds, &|pixels| {
+            cancel.progress(pixels);
+            !cancel.is_cancelled()
+        });
+        let [primary, mixed, real, mixed_shadow, real_shadow] = kinds;
+        *rays += RayTotals {
+            primary,
+            mixed,
+            real,
+            mixed_shadow,
+            real_shadow,
+        };
+        outcome
     }
 
     /// Makes room for `wanted` lanes, or for as many as there is memory for; returns how many may be used.
@@ -228,19 +262,24 @@ impl GpuBackend {
         Ok(())
     }
 
-    /// All samples of a few pixels, from upload to film.
+    /// All samples of a few pixels, from upload to film, `at_once` a batch; `rays` grows once the film has them.
     fn render_pixels(
         &mut self,
         film: &mut Film,
         real_pass: bool,
         work: &[PixelWork],
-    ) -> Result<[u64; 5], GpuError> {
+        at_once: u32,
+        rays: &mut [u64; 5],
+    ) -> Result<(), GpuError> {
         let Some(lanes) = self.lanes.take() else {
-            return Err(GpuError::Lost("no lanes".to_owned()));
+            return Err(GpuError::Lost("no room for samples".to_owned()));
         };
-        let outcome = self.render_pixels_on(&lanes, film, real_pass, work);
+        let outcome = self.render_pixels_on(&lanes, film, real_pass, work, at_once);
         self.lanes = Some(lanes);
-        outcome
+        for (sum, n) in rays.iter_mut().zip(outcome?) {
+            *sum += n;
+        }
+        Ok(())
     }
 
     fn render_pixels_on(
@@ -249,6 +288,7 @@ impl GpuBackend {
         film: &mut Film,
         real_pass: bool,
         work: &[PixelWork],
+        at_once: u32,
     ) -> Result<[u64; 5], GpuError> {
         let gather = |pixel: &PixelWork| film.pixels[pixel.pixel as usize];
         let sums: Vec<_> = work.iter().map(gather).collect();
@@ -260,7 +300,6 @@ impl GpuBackend {
         lanes.upload(&self.gpu, work, &sums, &guides);
 
         let longest = work.iter().map(PixelWork::len).max().unwrap_or(0);
-        let at_once = (lanes.capacity / work.len()).clamp(1, MOST_SAMPLES as usize) as u32;
         let mut rays = [0; 5];
         let mut sample_offset = 0;
         while sample_offset < longest {
@@ -429,6 +468,28 @@ impl GpuBackend {
             }
         }
     }
+}
+
+/// The samples that every pixel within reach of something virtual still lacks.
+pub(super) fn main_work(pixels: &[PixelInfo], film: &Film, end: u32) -> Vec<PixelWork> {
+    let next = |pixel: usize| film.first_sample + film.pixels[pixel].n;
+    (0..film.pixels.len())
+        .filter(|&pixel| pixels[pixel].flags & PIXEL_OUT_OF_REACH == 0 && next(pixel) < end)
+        .map(|pixel| PixelWork::new(pixel as u32, next(pixel)..end))
+        .collect()
+}
+
+/// The real samples that edge pixels lack; `everywhere`: those of all pixels that are not wholly virtual.
+pub(super) fn real_work(film: &Film, everywhere: bool) -> Vec<PixelWork> {
+    let first = film.first_sample;
+    film.pixels
+        .iter()
+        .enumerate()
+        .filter(|&(pixel, sums)| {
+            film.needs_real(pixel) || (everywhere && sums.m < sums.n && sums.n_real < sums.n)
+        })
+        .map(|(pixel, sums)| PixelWork::new(pixel as u32, first + sums.n_real..first + sums.n))
+        .collect()
 }
 
 /// How many of the first pixels of `work` take their samples, or [`MOST_SAMPLES`] of them, in one batch of `lanes`; at least one.

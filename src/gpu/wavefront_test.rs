@@ -6,9 +6,10 @@ use bytemuck::Zeroable;
 use glam::Vec3;
 
 use super::harness::test_device;
+use super::wavefront::{main_work, real_work};
 use super::*;
 use crate::film::{Film, Guide, Sample};
-use crate::packed::Frame;
+use crate::packed::{Frame, PIXEL_OUT_OF_REACH, PixelInfo};
 
 const STATE: &str = "
 const STAGE_DONE: u32 = 0u;
@@ -172,12 +173,9 @@ fn passes_give_the_bits_of_the_twin_however_they_are_cut() {
     let mut traced = [0; 5];
     for end in [2, 9, 30] {
         let work = work_to(&film, end);
-        let pass = backend
-            .render(&mut film, false, &work, &go_on)
+        backend
+            .render(&mut film, false, &work, &mut traced, &go_on)
             .expect("renders");
-        for (sum, n) in traced.iter_mut().zip(pass) {
-            *sum += n;
-        }
     }
     assert_eq!(film, expected);
     let samples: u64 = expected.pixels.iter().map(|p| u64::from(p.n)).sum();
@@ -187,7 +185,7 @@ fn passes_give_the_bits_of_the_twin_however_they_are_cut() {
     let mut other = Film::new(WIDTH, HEIGHT, 0, true);
     let work = work_to(&other, 30);
     toy_backend(gpu, 8)
-        .render(&mut other, false, &work, &go_on)
+        .render(&mut other, false, &work, &mut traced, &go_on)
         .expect("renders");
     assert_ne!(other.pixels, expected.pixels);
 }
@@ -195,6 +193,7 @@ fn passes_give_the_bits_of_the_twin_however_they_are_cut() {
 #[test]
 fn the_real_pass_fills_its_own_sums() {
     let Some(gpu) = test_device() else { return };
+    let mut rays = [0; 5];
     let start = {
         let mut film = Film::new(WIDTH, HEIGHT, 0, false);
         let work = work_to(&film, 5);
@@ -208,7 +207,7 @@ fn the_real_pass_fills_its_own_sums() {
     toy_render(1, &mut expected, true, &work);
     let mut film = start;
     toy_backend(gpu, 1)
-        .render(&mut film, true, &work, &go_on)
+        .render(&mut film, true, &work, &mut rays, &go_on)
         .expect("renders");
     assert_eq!(film, expected);
     assert!(film.pixels[0].n_real == 4 && film.pixels[2].n_real == 5);
@@ -218,12 +217,13 @@ fn the_real_pass_fills_its_own_sums() {
 #[test]
 fn one_pixel_takes_more_samples_than_a_loop_may_have_rounds() {
     let Some(gpu) = test_device() else { return };
+    let mut rays = [0; 5];
     let mut expected = Film::new(WIDTH, HEIGHT, 0, false);
     let work = [PixelWork::new(11, 0..70_000)];
     toy_render(3, &mut expected, false, &work);
     let mut film = Film::new(WIDTH, HEIGHT, 0, false);
     toy_backend(gpu, 3)
-        .render(&mut film, false, &work, &go_on)
+        .render(&mut film, false, &work, &mut rays, &go_on)
         .expect("renders");
     assert_eq!(film, expected);
 }
@@ -237,13 +237,14 @@ fn after_a_loss_another_backend_goes_on_with_whole_pixels() {
     let mut film = Film::new(WIDTH, HEIGHT, 0, true);
     let mut backend = toy_backend(&own, 5);
     backend.lose_device_after(2);
+    let mut rays = [0; 5];
     // Two batches of the least size, then the loss.
     let work = work_to(&film, 8);
     let error = backend
-        .render(&mut film, false, &work, &go_on)
+        .render(&mut film, false, &work, &mut rays, &go_on)
         .expect_err("the device is lost");
     assert!(matches!(error, GpuError::Lost(_)), "{error}");
-    let again = backend.render(&mut film, false, &work[..1], &go_on);
+    let again = backend.render(&mut film, false, &work[..1], &mut rays, &go_on);
     assert!(again.is_err(), "a lost device stays lost");
 
     let done = film.pixels.iter().filter(|p| p.n > 0).count();
@@ -253,6 +254,8 @@ fn after_a_loss_another_backend_goes_on_with_whole_pixels() {
         work.len()
     );
     assert!(film.pixels.iter().all(|p| [0, 7, 8].contains(&p.n)));
+    let taken: u64 = film.pixels.iter().map(|p| u64::from(p.n)).sum();
+    assert_eq!(rays[0], taken, "rays of what was finished are counted");
 
     let mut expected = Film::new(WIDTH, HEIGHT, 0, true);
     toy_render(5, &mut expected, false, &work);
@@ -265,10 +268,11 @@ fn after_a_loss_another_backend_goes_on_with_whole_pixels() {
 #[test]
 fn a_stopped_pass_leaves_whole_pixels() {
     let Some(gpu) = test_device() else { return };
+    let mut rays = [0; 5];
     let mut film = Film::new(WIDTH, HEIGHT, 0, false);
     let work = work_to(&film, 20);
     toy_backend(gpu, 2)
-        .render(&mut film, false, &work, &|_| false)
+        .render(&mut film, false, &work, &mut rays, &|_| false)
         .expect("stops");
     let done = film.pixels.iter().filter(|p| p.n > 0).count();
     assert!(done > 0 && done < work.len(), "{done}");
@@ -278,6 +282,7 @@ fn a_stopped_pass_leaves_whole_pixels() {
 #[test]
 fn kernels_are_timed_where_the_device_can() {
     let Some(gpu) = test_device() else { return };
+    let mut rays = [0; 5];
     let mut backend = toy_backend(gpu, 2);
     if !backend.profile() {
         eprintln!("skipped: {} takes no timestamps", gpu.name());
@@ -286,11 +291,39 @@ fn kernels_are_timed_where_the_device_can() {
     let mut film = Film::new(WIDTH, HEIGHT, 0, false);
     let work = work_to(&film, 2);
     backend
-        .render(&mut film, false, &work, &go_on)
+        .render(&mut film, false, &work, &mut rays, &go_on)
         .expect("renders");
     let seconds = backend.kernel_seconds().expect("profiled");
     assert!(
         seconds.generate > 0.0 && seconds.advance > 0.0 && seconds.accumulate > 0.0,
         "{seconds:?}"
     );
+}
+
+#[test]
+fn a_pass_asks_for_what_each_pixel_lacks() {
+    let mut film = Film::new(4, 1, 10, false);
+    for index in 0..3 {
+        let sample = |is_virtual| Sample {
+            is_virtual,
+            contribution: Vec3::ONE,
+            real: None,
+            guide: None,
+        };
+        film.add(1, &sample(index == 0));
+        film.add(2, &sample(false));
+    }
+    let mut pixels = [PixelInfo {
+        difference_probability: 1.0,
+        flags: 0,
+    }; 4];
+    pixels[3].flags = PIXEL_OUT_OF_REACH;
+    let work = |pixel, samples| PixelWork::new(pixel, samples);
+    assert_eq!(
+        main_work(&pixels, &film, 14),
+        [work(0, 10..14), work(1, 13..14), work(2, 13..14)]
+    );
+    assert_eq!(main_work(&pixels, &film, 13), [work(0, 10..13)]);
+    assert_eq!(real_work(&film, false), [work(1, 10..13)]);
+    assert_eq!(real_work(&film, true), [work(1, 10..13), work(2, 10..13)]);
 }

@@ -48,3 +48,30 @@ pub struct PackedScene {
     real_vertex_count: usize,
     env_mean_luminance: f64,
 }
+
+#[cfg(test)]
+impl PackedScene {
+    /// No geometry, no light: what unit tests of the shading fill in by hand.
+    pub(crate) fn empty() -> Self {
+        let world = || WorldBvh::build(&[], 0).expect("an empty world is legal");
+        Self {
+            frame: bytemuck::Zeroable::zeroed(),
+            anchor_m: [0.0; 3],
+            real_bvh: world(),
+            virtual_bvh: world(),
+            triangles: Vec::new(),
+            vertices: Vec::new(),
+            materials: Vec::new(),
+            texture_refs: Vec::new(),
+            texels: Vec::new(),
+            lights: Vec::new(),
+            env_texels: Vec::new(),
+            env_cdf: Vec::new(),
+            photo_albedo: Vec::new(),
+            pixels: Vec::new(),
+            material_table: materials::MaterialTable::default(),
+            real_vertex_count: 0,
+            env_mean_luminance: 0.0,
+        }
+    }
+}

@@ -15,6 +15,7 @@ mod object;
 mod photo;
 mod pose;
 mod reader;
+mod scan;
 mod settings;
 mod shape;
 pub mod smooth;

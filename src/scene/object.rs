@@ -12,6 +12,7 @@ use super::gltf::{GltfScene, PlacedLight, Problem, PunctualLight, load_gltf};
 use super::material::{lambertian, read_material};
 use super::pose::read_transform;
 use super::reader::{Choice, MAX_MAGNITUDE, Node, Table};
+use super::scan::settle_scan;
 use super::shape::Shape;
 use super::{AlphaMode, Instance, Light, LightKind, Material, Object, Side};
 
@@ -81,16 +82,13 @@ impl<'w> ObjectReader<'w> {
             None => table.required("mesh", "mesh = \"file.glb\"", |node| self.read_mesh(node))?,
         };
         let world_from_object = read_transform(&table)?;
-        table.optional("smooth_radius_m", refuse_smoothing)?;
         let name = table.optional("name", |node| Ok(node.string()?.to_owned()))?;
         let mut object = Object {
             name: name.unwrap_or(parts.name),
             side,
             world_from_object,
             instances: parts.instances,
-            self_shadow_bias_m: table
-                .optional("self_shadow_bias_m", Node::not_negative)?
-                .unwrap_or(0.0) as f32,
+            self_shadow_bias_m: 0.0,
             albedo_from_photo: false,
         };
         for light in &parts.lights {
@@ -100,6 +98,9 @@ impl<'w> ObjectReader<'w> {
         }
         self.drop_flat_instances(&mut object);
         check_extent(&table, &object)?;
+        let may_detect = side == Side::Real && shape.is_none();
+        let note = settle_scan(&table, &mut object, may_detect)?;
+        self.warnings.extend(note);
         self.settle_materials(&table, &mut object, parts.has_materials, shape.is_some())?;
         Ok(object)
     }
@@ -206,18 +207,6 @@ fn check_keys(table: &Table, side: Side) -> Result<Option<Shape>> {
     }
     table.refuse_unknown(&known)?;
     Ok(shape)
-}
-
-/// A scan left rough where smoothing was asked for would be another picture than the one asked for.
-fn refuse_smoothing(node: &Node) -> Result<()> {
-    if node.not_negative()? > 0.0 {
-        return Err(node.error(
-            "`smooth_radius_m` is not applied by this version",
-            "0",
-            "remove it",
-        ));
-    }
-    Ok(())
 }
 
 fn read_shape(shape: Shape, table: &Table) -> Result<Parts> {

@@ -2,13 +2,13 @@ mod bsdf;
 mod fresnel;
 mod surface;
 mod texture;
+mod twins;
 
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
-use crate::accel::WorldBvh;
 use crate::material::Surface;
-use crate::packed::{Frame, Material, NONE, PackedScene, Triangle, Vertex};
+use crate::packed::{Material, NONE, PackedScene, Triangle, Vertex};
 
 /// PCG-XSH-RR 32 (O'Neill 2014): test inputs that share nothing with the renderer's own numbers.
 pub struct Random(u64);
@@ -97,10 +97,6 @@ pub fn one_triangle(corners: [[f32; 3]; 3], material: Material) -> PackedScene {
         })
         .collect();
     PackedScene {
-        frame: Frame::zeroed(),
-        anchor_m: [0.0; 3],
-        real_bvh: empty_world(),
-        virtual_bvh: empty_world(),
         triangles: vec![Triangle {
             vertices: [0, 1, 2],
             material: 0,
@@ -110,13 +106,7 @@ pub fn one_triangle(corners: [[f32; 3]; 3], material: Material) -> PackedScene {
         }],
         vertices,
         materials: vec![material],
-        texture_refs: Vec::new(),
-        texels: Vec::new(),
-        lights: Vec::new(),
-        env_texels: Vec::new(),
-        env_alias: Vec::new(),
-        photo_albedo: Vec::new(),
-        pixels: Vec::new(),
+        ..PackedScene::empty()
     }
 }
 
@@ -155,8 +145,4 @@ pub fn around(axis: Vec3, theta: f64, phi: f64) -> Vec3 {
     let b = n.cross(t);
     let d: DVec3 = t * (theta.sin() * phi.cos()) + b * (theta.sin() * phi.sin()) + n * theta.cos();
     d.as_vec3().normalize()
-}
-
-fn empty_world() -> WorldBvh {
-    WorldBvh::build(&[], 0).expect("an empty world is legal")
 }

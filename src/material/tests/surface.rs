@@ -1,13 +1,15 @@
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
+use super::texture::random_texture;
 use super::{Random, around, one_triangle, plain_material};
 use crate::accel::Hit;
 use crate::material::normal::{mapped_normal, tangent_from_uv, valid_shading_normal};
 use crate::material::{bsdf_is_lambertian, surface_alpha, surface_at};
 use crate::packed::{
     Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
-    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_UNLIT, Material, PackedScene, TextureRef,
+    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_UNLIT, Material, NONE, PackedScene,
+    TEXTURE_NEAREST, TEXTURE_UV1, TextureRef, Triangle, Vertex,
 };
 
 const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -348,4 +350,110 @@ fn photo_albedo_is_read_where_the_camera_sees_the_point() {
     assert_eq!(at(&scene).base_color.x, 0.9);
     scene.frame.camera_back = [0.0, 0.0, -1.0, 0.0];
     assert_eq!(at(&scene).base_color.x, 0.9);
+}
+
+/// Random triangles of random materials that use every slot, flag and attribute.
+pub fn gallery(random: &mut Random) -> PackedScene {
+    let mut scene = one_triangle(CORNERS, plain_material());
+    scene.vertices.clear();
+    scene.triangles.clear();
+    scene.materials.clear();
+    scene.texture_refs = (0..12)
+        .map(|i| {
+            let mut texture = random_texture(random, &mut scene.texels);
+            texture.flags &= !TEXTURE_NEAREST;
+            texture.flags |= if i % 2 == 0 { TEXTURE_UV1 } else { 0 };
+            texture
+        })
+        .collect();
+    for id in 0..60u32 {
+        let slot = |random: &mut Random| [NONE, random.bits() % 12][random.bits() as usize & 1];
+        let kinds = [
+            0,
+            0,
+            MATERIAL_LAMBERTIAN,
+            MATERIAL_UNLIT,
+            MATERIAL_QUAD_LIGHT,
+            MATERIAL_PHOTO_ALBEDO,
+            MATERIAL_ALPHA_BLEND,
+            MATERIAL_ALPHA_MASK,
+        ];
+        scene.materials.push(Material {
+            base_color: [random.uniform(), random.uniform(), random.uniform(), 0.9],
+            emissive: random.triple(),
+            normal_scale: random.range(0.1, 1.5),
+            metallic: random.uniform(),
+            roughness: random.uniform(),
+            ior: random.range(1.0, 2.0),
+            specular: random.uniform(),
+            specular_color: random.triple(),
+            transmission: random.uniform(),
+            clearcoat: random.uniform(),
+            clearcoat_roughness: random.uniform(),
+            clearcoat_normal_scale: random.range(0.1, 1.5),
+            alpha_cutoff: 0.4,
+            flags: kinds[random.bits() as usize % kinds.len()] | MATERIAL_TEXTURED,
+            base_color_texture: slot(random),
+            metallic_roughness_texture: slot(random),
+            normal_texture: slot(random),
+            emissive_texture: slot(random),
+            specular_texture: slot(random),
+            specular_color_texture: slot(random),
+            transmission_texture: slot(random),
+            clearcoat_texture: slot(random),
+            clearcoat_roughness_texture: slot(random),
+            clearcoat_normal_texture: slot(random),
+            ..plain_material()
+        });
+        let normal = random.direction();
+        let with_tangents = random.bits() & 1 == 0;
+        for _ in 0..3 {
+            let p = random.direction() * random.range(0.5, 2.0);
+            let n = (normal + random.direction() * 0.3).normalize();
+            let t = random.direction();
+            scene.vertices.push(Vertex {
+                position_u0: [p.x, p.y, p.z, random.uniform()],
+                normal_v0: [n.x, n.y, n.z, random.uniform()],
+                tangent: if with_tangents {
+                    [t.x, t.y, t.z, 1.0]
+                } else {
+                    [0.0; 4]
+                },
+                color: [random.uniform(), random.uniform(), random.uniform(), 1.0],
+                uv1: [random.uniform(), random.uniform(), 0.0, 0.0],
+            });
+        }
+        scene.triangles.push(Triangle {
+            vertices: [3 * id, 3 * id + 1, 3 * id + 2],
+            material: id,
+            light: NONE,
+            object: id % 5,
+            pad: [0; 2],
+        });
+    }
+    let (width, height) = (16, 12);
+    scene.frame = Frame {
+        camera_position: [0.0, 0.0, 6.0, 0.0],
+        camera_right: [1.0, 0.0, 0.0, 0.0],
+        camera_up: [0.0, 1.0, 0.0, 0.0],
+        camera_back: [0.0, 0.0, 1.0, 0.0],
+        intrinsics: [20.0, 20.0, 8.0, 6.0],
+        distortion: [0.1, -0.05, 0.01, 0.02],
+        distortion_k3: 0.01,
+        width,
+        height,
+        photo_albedo_median: [0.9, 0.8, 0.7, 0.0],
+        ..Frame::zeroed()
+    };
+    scene.photo_albedo = (0..width * height)
+        .map(|_| {
+            [
+                random.uniform(),
+                random.uniform(),
+                random.uniform(),
+                random.range(5.0, 7.0),
+            ]
+        })
+        .collect();
+    scene
 }

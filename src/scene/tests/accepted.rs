@@ -447,6 +447,35 @@ fn a_scan_without_materials_takes_its_albedo_from_the_photograph() {
     );
 }
 
+#[test]
+fn smoothing_is_in_world_metres_and_as_asked_for() {
+    let Some(data) = shared_data("kinect_basket_rgbd") else {
+        return;
+    };
+    let load = |keys: &str| {
+        let mesh = data.join("proxy.glb");
+        let scene = load_with_camera(&format!("[[real]]\nmesh = '{}'\n{keys}", mesh.display()));
+        let positions = scene.objects[0].instances[0].primitive.positions.clone();
+        (
+            positions,
+            scene.objects[0].self_shadow_bias_m,
+            scene.warnings,
+        )
+    };
+    let (raw, bias, warnings) = load("smooth_radius_m = 0\n");
+    assert_eq!((bias, warnings.len()), (0.0, 0));
+    let (smoothed, bias, warnings) = load("smooth_radius_m = 0.01\nself_shadow_bias_m = 0.002\n");
+    assert_eq!((bias, warnings.len()), (0.002, 0));
+    assert_ne!(raw, smoothed);
+    // Twice the size and twice the radius is the same mesh up to rounding; the same radius (the control) is not.
+    let far = |other: &[[f32; 3]]| {
+        let pairs = smoothed.iter().flatten().zip(other.iter().flatten());
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    assert!(far(&load("scale = 2\nsmooth_radius_m = 0.02\n").0) < 1e-6);
+    assert!(far(&load("scale = 2\nsmooth_radius_m = 0.01\n").0) > 1e-4);
+}
+
 /// The scan of the desk with a helmet on it, and the raw basket photograph through its lens distortion.
 #[test]
 fn the_measured_scenes() {
@@ -474,5 +503,11 @@ fn the_measured_scenes() {
         assert!(proxy.albedo_from_photo && !helmet.albedo_from_photo);
         assert!(proxy.instances[0].primitive.triangles.len() > 100_000);
         assert!(helmet.instances[0].material.base_color_texture.is_some());
+        // Only the scan is smoothed, and that is said.
+        assert!(proxy.self_shadow_bias_m > 0.0);
+        assert_eq!(helmet.self_shadow_bias_m, 0.0);
+        let noise = "proxy: has the noise of a depth camera";
+        let said = scene.warnings.iter().filter(|w| w.starts_with(noise));
+        assert_eq!(said.count(), 1, "{:?}", scene.warnings);
     }
 }

@@ -377,10 +377,6 @@ fn impossible_objects() {
         ("shape = \"box\"\nself_shadow_bias_m = @@-1\n", "at least 0"),
         ("shape = \"box\"\nsmooth_radius_m = @@-1\n", "at least 0"),
         (
-            "shape = \"box\"\nsmooth_radius_m = @@0.01\n",
-            "not applied by this version",
-        ),
-        (
             "shape = \"box\"\nalbedo = @@\"from-photo\"\n",
             "without a photograph",
         ),
