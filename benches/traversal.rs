@@ -69,7 +69,8 @@ fn traversal(criterion: &mut Criterion) {
             let mut group = criterion.benchmark_group(format!("{}/{rays_name}", work.name));
             group.throughput(Throughput::Elements(rays.len() as u64));
             group.sample_size(10);
-            group.measurement_time(Duration::from_secs(2));
+            group.warm_up_time(Duration::from_millis(500));
+            group.measurement_time(Duration::from_secs(1));
             let mut time = |name: &str, kind: &str, trace: &dyn Fn(&Ray) -> bool| {
                 group.bench_function(BenchmarkId::new(kind, name), |bencher| {
                     bencher.iter(|| rays.iter().filter(|ray| trace(black_box(ray))).count());

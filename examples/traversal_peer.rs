@@ -1,6 +1,7 @@
 //! The mixray side of benches/peers/embree.py: writes meshes and rays to the folder given, then times them when told to.
 //!
-//! A line `closest|any WORKLOAD coherent|incoherent` on stdin is answered with `SECONDS HITS SUM_OF_DISTANCES`.
+//! A line `closest|any WORKLOAD coherent|incoherent` on stdin is answered with hits, the sum of
+//! their distances, and the seconds of each chunk of rays.
 
 #[path = "../benches/support/workloads.rs"]
 mod workloads;
@@ -11,6 +12,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use mixray::accel::Ray;
+
+const CHUNK: usize = 4096;
 
 fn write(path: &Path, floats: &[f32]) -> std::io::Result<()> {
     std::fs::write(path, bytemuck::cast_slice(floats))
@@ -67,19 +70,23 @@ fn main() -> Result<(), Box<dyn Error>> {
             &work.incoherent
         };
         let (mut hits, mut distance) = (0, 0.0);
-        let start = Instant::now();
-        if kind == "closest" {
-            for ray in rays {
-                let hit = work.world.closest(ray);
-                if hit.is_hit() {
-                    hits += 1;
-                    distance += f64::from(hit.t);
+        let mut seconds = String::new();
+        for chunk in rays.chunks(CHUNK) {
+            let start = Instant::now();
+            if kind == "closest" {
+                for ray in chunk {
+                    let hit = work.world.closest(ray);
+                    if hit.is_hit() {
+                        hits += 1;
+                        distance += f64::from(hit.t);
+                    }
                 }
+            } else {
+                hits += chunk.iter().filter(|ray| work.world.any(ray)).count();
             }
-        } else {
-            hits = rays.iter().filter(|ray| work.world.any(ray)).count();
+            seconds += &format!(" {}", start.elapsed().as_secs_f64());
         }
-        println!("{} {hits} {distance}", start.elapsed().as_secs_f64());
+        println!("{hits} {distance}{seconds}");
     }
     Ok(())
 }

@@ -269,7 +269,7 @@ fn delta_sample(wi: vec3<f32>, weight: vec3<f32>, transmitted: bool) -> BsdfSamp
 
 fn mixture_sample(s: Surface, lobes: Lobes, wo: vec3<f32>, wi: vec3<f32>) -> BsdfSample {
     let eval = eval_with(s, lobes, wo, wi);
-    if !(eval.pdf > 0.0) {
+    if eval.pdf <= 0.0 {
         return SAMPLE_NOTHING;
     }
     return BsdfSample(wi, eval.f_cos * (1.0 / eval.pdf), eval.pdf, false, dot3(s.ng, wi) < 0.0, true);
@@ -298,7 +298,7 @@ fn bsdf_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
     }
     let wi = sample_lambert(s, u.y, u.z);
     let pdf = lambert_cos(s, wi) * INV_PI;
-    if !(pdf > 0.0) {
+    if pdf <= 0.0 {
         return SAMPLE_NOTHING;
     }
     return BsdfSample(wi, s.base_color, pdf, false, false, true);
@@ -306,7 +306,7 @@ fn bsdf_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
 
 fn sample_layers(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
     let lobes = lobes_at(s, wo);
-    if !(lobes.sum > NO_ALBEDO) {
+    if lobes.sum <= NO_ALBEDO {
         return SAMPLE_NOTHING;
     }
     if u.x < lobes.p_diffuse {
@@ -429,5 +429,6 @@ fn bsdf_directional_albedo_bound(s: Surface) -> f32 {
     if bsdf_is_lambertian(s) {
         return max3(s.base_color);
     }
-    return 1.0;
+    let under = max3(diffuse_color(s)) + grazing_albedo(s);
+    return select(under, max(under, 1.0), s.clearcoat > 0.0);
 }

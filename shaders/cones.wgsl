@@ -5,7 +5,11 @@ import package::math::{cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
 
 const PI: f32 = 3.14159265358979;
 const WIDE_SIN2: f32 = 0.5;
-const PADDING: f32 = 1e-5;
+const CONE_PADDING: f32 = 1e-5;
+const CONE_PADDING_SIN2: f32 = 1e-9;
+const SPHERE_PADDING: f32 = 1e-3;
+const SPHERE_PADDING_DISTANCE2: f32 = 2e-10;
+const COSINE_PADDING: f32 = 1e-6;
 
 struct Cone {
     axis: vec3<f32>,
@@ -32,7 +36,7 @@ fn cone_of(i: u32, position: vec3<f32>, ns: vec3<f32>) -> Cone {
     if cos_axis < cos {
         largest = cos_axis * cos + safe_sqrt(1.0 - cos_axis * cos_axis) * safe_sqrt(sin2);
     }
-    return Cone(axis, sin2, one_minus_cos, false, max(2.0 * one_minus_cos * largest, 0.0));
+    return Cone(axis, sin2, one_minus_cos, false, max(2.0 * one_minus_cos * (largest + COSINE_PADDING), 0.0));
 }
 
 struct ConeSample {
@@ -86,7 +90,7 @@ fn cone_pdf(position: vec3<f32>, ns: vec3<f32>, direction: vec3<f32>) -> f32 {
 
 fn inside(cone: Cone, direction: vec3<f32>) -> bool {
     let across = cross3(direction, cone.axis);
-    return dot3(direction, cone.axis) > 0.0 && dot3(across, across) <= cone.sin2 * (1.0 + PADDING);
+    return dot3(direction, cone.axis) > 0.0 && dot3(across, across) <= cone.sin2 * (1.0 + CONE_PADDING) + CONE_PADDING_SIN2;
 }
 
 fn cone_solid_angle_fraction(position: vec3<f32>, ns: vec3<f32>) -> f32 {
@@ -101,8 +105,10 @@ fn direction_meets_spheres(position: vec3<f32>, direction: vec3<f32>) -> bool {
     for (var i = 0u; i < frame.sphere_count; i++) {
         let sphere = frame.spheres[i];
         let to_centre = sphere.xyz - position;
-        let radius_squared = sphere.w * sphere.w * (1.0 + PADDING);
-        if dot3(to_centre, to_centre) <= radius_squared { return true; }
+        let distance_squared = dot3(to_centre, to_centre);
+        let radius_squared = sphere.w * sphere.w * (1.0 + SPHERE_PADDING)
+            + distance_squared * SPHERE_PADDING_DISTANCE2;
+        if distance_squared <= radius_squared { return true; }
         let across = cross3(direction, to_centre);
         if dot3(direction, to_centre) > 0.0 && dot3(across, across) <= radius_squared { return true; }
     }

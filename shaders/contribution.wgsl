@@ -10,9 +10,19 @@ const SET_DIFFERENCE_BSDF: u32 = 1u;
 const SET_DIFFERENCE_CONE: u32 = 2u;
 const SET_PATH_LIGHT: u32 = 3u;
 const SET_PATH_BSDF: u32 = 4u;
+const SET_DIFFERENCE_CHOICE: u32 = 5u;
+const SETS_PER_DEPTH: u32 = 6u;
+const FIRST_DEPTH_SET: u32 = 2u;
 
 fn draw(st: ptr<function, PathState>, purpose: u32) -> vec4<f32> {
-    return sample_4d(sample_key(st), 3u + (*st).depth * 5u + purpose);
+    return draw_of(st, purpose, 0u, 1u);
+}
+
+fn draw_of(st: ptr<function, PathState>, purpose: u32, j: u32, count: u32) -> vec4<f32> {
+    var key = sample_key(st);
+    key.index = key.index * count + j;
+    key.total *= count;
+    return sample_4d(key, FIRST_DEPTH_SET + (*st).depth * SETS_PER_DEPTH + purpose);
 }
 
 fn sample_key(st: ptr<function, PathState>) -> SampleKey {

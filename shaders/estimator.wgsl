@@ -62,12 +62,8 @@ fn advance(st: ptr<function, PathState>) {
         case STAGE_PATH: { goes_on = path_hit(st); }
         case STAGE_PATH_SHADOW: { path_shadow(st); }
         case STAGE_PAPER_BEHIND: { paper_behind(st); }
-        case STAGE_DIFFERENCE_SHADOW: {
-            if shadow_counts(st) { (*st).radiance += (*st).shadow_contribution; }
-        }
-        case STAGE_DIFFERENCE_CONE: {
-            if virtual_is_nearer((*st).hit_virtual, (*st).hit_real) { split_difference(st); }
-        }
+        case STAGE_DIFFERENCE_SHADOW: { difference_shadow(st); }
+        case STAGE_DIFFERENCE_CONE: { difference_cone(st); }
         case STAGE_DIFFERENCE_BSDF: { difference_bsdf(st); }
         case STAGE_REAL_PASS: { real_pass(st); }
         default: {}
@@ -259,11 +255,15 @@ fn path_shadow(st: ptr<function, PathState>) {
     if open_virtual && open_real { accumulate(st, (*st).shadow_contribution); }
 }
 
-fn shadow_counts(st: ptr<function, PathState>) -> bool {
+fn difference_shadow(st: ptr<function, PathState>) {
     let open_real = (*st).hit_real.triangle == NONE;
     let open_virtual = (*st).hit_virtual.triangle == NONE;
-    if (*st).shadow_request == REQUEST_SHADOW_DIFFERENCE { return !open_virtual && open_real; }
-    return open_virtual && open_real;
+    let blocked_alone = (*st).shadow_request == REQUEST_SHADOW_DIFFERENCE;
+    if open_real && open_virtual != blocked_alone { (*st).radiance += (*st).shadow_contribution; }
+}
+
+fn difference_cone(st: ptr<function, PathState>) {
+    if virtual_is_nearer((*st).hit_virtual, (*st).hit_real) { split_difference(st); }
 }
 
 fn difference_bsdf(st: ptr<function, PathState>) {

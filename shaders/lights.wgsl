@@ -6,6 +6,8 @@ import package::bindings::{
 import package::environment::{env_direction_pdf, env_sample};
 import package::math::{cross3, dot3, length3, safe_sqrt};
 import package::state::FAR;
+@if(area_lights) import package::rectangle::{rectangle_from, sample_rectangle};
+@if(area_lights) import package::surface::triangle_emission;
 
 struct LightSample {
     direction: vec3<f32>,
@@ -20,15 +22,15 @@ fn no_light() -> LightSample {
     return LightSample(vec3<f32>(0.0, 0.0, 1.0), 0.0, vec3<f32>(0.0), 0.0, false, 0u);
 }
 
-fn light_select(u: f32) -> u32 {
+fn light_select(u: f32, coin: f32) -> u32 {
     let scaled = u * f32(frame.light_count);
     let index = min(u32(scaled), frame.light_count - 1u);
-    if scaled - f32(index) <= lights[index].alias_threshold { return index; }
+    if coin < lights[index].alias_threshold { return index; }
     return lights[index].alias_;
 }
 
 fn light_sample(position: vec3<f32>, u: vec4<f32>) -> LightSample {
-    let light = lights[light_select(u.x)];
+    let light = lights[light_select(u.x, u.w)];
     if light.kind == LIGHT_ENVIRONMENT {
         let s = env_sample(u.y, u.z);
         return LightSample(s.direction, FAR, s.radiance, s.pdf * light.select_pdf, false, light.side);
@@ -71,6 +73,7 @@ fn spot_falloff(light: Light, cos: f32) -> f32 {
 
 @if(area_lights)
 fn sample_area_light(light: Light, position: vec3<f32>, u0: f32, u1: f32) -> LightSample {
+    let rectangle = rectangle_from(light, position);
     var a = u0;
     var b = u1;
     if light.kind != LIGHT_QUAD {
@@ -78,14 +81,23 @@ fn sample_area_light(light: Light, position: vec3<f32>, u0: f32, u1: f32) -> Lig
         a = root * (1.0 - u1);
         b = root * u1;
     }
-    let point = light.position.xyz + light.axis_u.xyz * a + light.axis_v.xyz * b;
-    let to_light = point - position;
+    var to_light = (light.position.xyz - position) + (light.axis_u.xyz * a + light.axis_v.xyz * b);
+    if rectangle.solid_angle > 0.0 {
+        to_light = sample_rectangle(rectangle, u0, u1);
+    }
     let distance = length3(to_light);
     if distance <= 0.0 { return no_light(); }
     let direction = to_light / distance;
-    let pdf = area_pdf(light, direction, distance);
+    var pdf = area_pdf(light, direction, distance);
+    if rectangle.solid_angle > 0.0 {
+        pdf = light.select_pdf / rectangle.solid_angle;
+    }
     if pdf <= 0.0 { return no_light(); }
-    return LightSample(direction, distance, light.radiance.xyz, pdf, false, light.side);
+    var radiance = light.radiance.xyz;
+    if light.triangle != NONE {
+        radiance = triangle_emission(light.triangle, a, b);
+    }
+    return LightSample(direction, distance, radiance, pdf, false, light.side);
 }
 
 @if(area_lights)
@@ -99,9 +111,12 @@ fn area_pdf(light: Light, direction: vec3<f32>, distance: f32) -> f32 {
 }
 
 @if(area_lights)
-fn light_pdf_hit(light: u32, direction: vec3<f32>, distance: f32) -> f32 {
+fn light_pdf_hit(light: u32, from_position: vec3<f32>, direction: vec3<f32>, distance: f32) -> f32 {
     if light == NONE { return 0.0; }
-    return area_pdf(lights[light], direction, distance);
+    let record = lights[light];
+    let rectangle = rectangle_from(record, from_position);
+    if rectangle.solid_angle > 0.0 { return record.select_pdf / rectangle.solid_angle; }
+    return area_pdf(record, direction, distance);
 }
 
 fn env_pdf(direction: vec3<f32>) -> f32 {

@@ -15,7 +15,7 @@ fn triangle_normal(e1: vec3<f32>, e2: vec3<f32>, fallback: vec3<f32>) -> vec3<f3
     let a2 = abs(e2);
     let m1 = max(max(a1.x, a1.y), a1.z);
     let m2 = max(max(a2.x, a2.y), a2.z);
-    if !(m1 > 1e-36 && m2 > 1e-36) {
+    if m1 <= 1e-36 || m2 <= 1e-36 {
         return fallback;
     }
     let n = cross3(e1 * (1.0 / m1), e2 * (1.0 / m2));
@@ -30,7 +30,7 @@ fn tangent_from_uv(e1: vec3<f32>, e2: vec3<f32>, d1: vec2<f32>, d2: vec2<f32>, n
     let det = d1.x * d2.y - d2.x * d1.y;
     let along_u = (e1 * d2.y - e2 * d1.y) * det;
     let along_v = (e2 * d1.x - e1 * d2.x) * det;
-    if !(dot3(along_u, along_u) > 0.0) {
+    if dot3(along_u, along_u) <= 0.0 {
         return vec4<f32>(0.0);
     }
     let handedness = select(1.0, -1.0, dot3(cross3(normal, along_u), along_v) > 0.0);
@@ -43,7 +43,7 @@ fn mapped_normal(normal: vec3<f32>, tangent: vec4<f32>, texel: vec3<f32>, scale:
     }
     let t_raw = tangent.xyz;
     let t_flat = t_raw - normal * dot3(normal, t_raw);
-    if !(dot3(t_flat, t_flat) > 1e-12) {
+    if dot3(t_flat, t_flat) <= 1e-12 {
         return normal;
     }
     let t = unit(t_flat);
@@ -60,7 +60,7 @@ fn mapped_normal(normal: vec3<f32>, tangent: vec4<f32>, texel: vec3<f32>, scale:
 
 fn valid_shading_normal(ng: vec3<f32>, ns: vec3<f32>, wo: vec3<f32>) -> vec3<f32> {
     let wo_z = dot3(wo, ng);
-    if !(wo_z > 0.0) {
+    if wo_z <= 0.0 {
         return ng;
     }
     let threshold = min(0.9 * wo_z, 0.01);
@@ -70,7 +70,7 @@ fn valid_shading_normal(ng: vec3<f32>, ns: vec3<f32>, wo: vec3<f32>) -> vec3<f32
         return ns;
     }
     let across = ns - ng * dot3(ns, ng);
-    if !(dot3(across, across) > 1e-12) {
+    if dot3(across, across) <= 1e-12 {
         return ng;
     }
     let x = unit(across);
@@ -80,7 +80,7 @@ fn valid_shading_normal(ng: vec3<f32>, ns: vec3<f32>, wo: vec3<f32>) -> vec3<f32
     let sin_2phi = (wo_x * threshold + wo_z * rest) / r2;
     let cos_2phi = (wo_z * threshold - wo_x * rest) / r2;
     let corrected = x * max(sin_2phi, 0.0) + ng * (1.0 + cos_2phi);
-    if !(dot3(corrected, corrected) > 1e-6) {
+    if dot3(corrected, corrected) <= 1e-6 {
         return ng;
     }
     let n = unit(corrected);

@@ -94,11 +94,30 @@ fn surface_alpha(hit: Hit) -> f32 {
     return 1.0;
 }
 
+@if(area_lights)
+fn triangle_emission(triangle: u32, u: f32, v: f32) -> vec3<f32> {
+    let entry = materials[triangles[triangle].material];
+    var emission = entry.emissive;
+    @if(textures) {
+        if entry.emissive_texture != NONE {
+            let corners = triangles[triangle].vertices;
+            let v0 = vertices[corners.x];
+            let v1 = vertices[corners.y];
+            let v2 = vertices[corners.z];
+            let b = vec3<f32>(1.0 - u - v, u, v);
+            let uv0 = blend2(b, vertex_uv0(v0), vertex_uv0(v1), vertex_uv0(v2));
+            let uv1 = blend2(b, vertex_uv1(v0), vertex_uv1(v1), vertex_uv1(v2));
+            emission *= slot_rgb(entry.emissive_texture, uv0, uv1);
+        }
+    }
+    return emission * surface_alpha(Hit(0.0, u, v, triangle));
+}
+
 fn photo_albedo_at(position: vec3<f32>) -> vec3<f32> {
     let median = frame.photo_albedo_median.xyz;
     let offset = position - frame.camera_position.xyz;
     let depth = -dot3(offset, frame.camera_back.xyz);
-    if !(depth > 0.0) {
+    if depth <= 0.0 {
         return median;
     }
     let x = dot3(offset, frame.camera_right.xyz) / depth;

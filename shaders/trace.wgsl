@@ -102,7 +102,8 @@ fn trace(ray: Ray, world: u32, any_hit: bool, thread: u32) -> Hit {
         last = 1u;
     }
     let turned_direction = turn(ray.direction, last);
-    let shear = vec3<f32>(turned_direction.x / turned_direction.z, turned_direction.y / turned_direction.z, 1.0 / turned_direction.z);
+    let scale = 1.0 / turned_direction.z;
+    let shear = vec3<f32>(turned_direction.x * scale, turned_direction.y * scale, scale);
 
     var t_best = ray.t_max;
     // No id is smaller: a hit at exactly t_max is not accepted.

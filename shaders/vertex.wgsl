@@ -3,11 +3,11 @@
 import package::bindings::{NONE, frame, materials, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT};
 import package::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample};
 import package::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
-import package::contribution::{accumulate, density_weight, draw};
+import package::contribution::{accumulate, density_weight, draw, draw_of};
 import package::contribution::{
-    SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
+    SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CHOICE, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
 };
-import package::lights::{light_pdf_hit, light_sample};
+import package::lights::{LightSample, light_pdf_hit, light_sample};
 import package::math::exp_;
 import package::state::{
     DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_SHADOW, PathState,
@@ -24,6 +24,7 @@ const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
 const SHADOW_SHORTEN: f32 = 2e-5;
 const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
+const DIFFERENCE_LIGHTS: u32 = 4u;
 const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
 
 struct Roulette {
@@ -77,22 +78,50 @@ fn add_emission(st: ptr<function, PathState>, s: Surface, distance: f32) {
     var weight = 1.0;
     @if(area_lights) {
         if s.light != NONE && (*st).density != DELTA_DENSITY {
-            weight = density_weight((*st).density, light_pdf_hit(s.light, (*st).direction, distance));
+            let from_position = s.position - (*st).direction * distance;
+            weight = density_weight((*st).density, light_pdf_hit(s.light, from_position, (*st).direction, distance));
         }
     }
     accumulate(st, (*st).throughput * s.emission * weight);
 }
 
+fn light_draws(st: ptr<function, PathState>) -> u32 {
+    return select(1u, DIFFERENCE_LIGHTS, (*st).mode == MODE_DIFFERENCE && (*st).depth == 1u);
+}
+
 fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
     if frame.light_count == 0u || bsdf_is_delta(s) { return; }
     let difference = (*st).mode == MODE_DIFFERENCE;
-    let u = draw(st, select(SET_PATH_LIGHT, SET_DIFFERENCE_LIGHT, difference));
-    let l = light_sample(s.position, u);
+    let set_id = select(SET_PATH_LIGHT, SET_DIFFERENCE_LIGHT, difference);
+    let count = light_draws(st);
+    var choice = vec4<f32>(0.0);
+    if count > 1u { choice = draw(st, SET_DIFFERENCE_CHOICE); }
+    var sum = 0.0;
+    var chosen_size = 1.0;
+    var contribution = vec3<f32>(0.0);
+    for (var j = 0u; j < count; j++) {
+        let l = light_sample(s.position, draw_of(st, set_id, j, count));
+        let candidate = light_contribution(st, s, wo, roulette, l, f32(count));
+        let size = max_element(abs(candidate));
+        sum += size;
+        if size > 0.0 && choice[j] * sum < size {
+            contribution = candidate;
+            chosen_size = size;
+            plan_shadow(st, s, l);
+        }
+    }
+    (*st).shadow_contribution = contribution * (sum / (chosen_size * f32(count)));
+}
+
+fn light_contribution(
+    st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette, l: LightSample, count: f32,
+) -> vec3<f32> {
+    let difference = (*st).mode == MODE_DIFFERENCE;
     let real_light = l.side == 0u;
-    if l.pdf <= 0.0 || ((*st).mode == MODE_REAL && !real_light) { return; }
-    if difference && real_light && !direction_meets_spheres(s.position, l.direction) { return; }
+    if l.pdf <= 0.0 || ((*st).mode == MODE_REAL && !real_light) { return vec3<f32>(0.0); }
+    if difference && real_light && !direction_meets_spheres(s.position, l.direction) { return vec3<f32>(0.0); }
     let f = bsdf_eval(s, wo, l.direction);
-    if max_element(f.f_cos) <= 0.0 { return; }
+    if max_element(f.f_cos) <= 0.0 { return vec3<f32>(0.0); }
     var weight = 1.0;
     if !l.delta {
         var other = f.pdf;
@@ -100,17 +129,21 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette:
             other = roulette.cone * cone_pdf(s.position, s.ns, l.direction);
             if !bsdf_is_lambertian(s) { other += f.pdf; }
         }
-        weight = l.pdf / (l.pdf + other);
+        weight = count * l.pdf / (count * l.pdf + other);
     }
     let sign = select(1.0, -1.0, difference && real_light);
-    (*st).shadow_contribution = (*st).throughput * f.f_cos * l.radiance * (sign * weight / l.pdf);
+    return (*st).throughput * f.f_cos * l.radiance * (sign * weight / l.pdf);
+}
+
+fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample) {
     (*st).shadow_direction = l.direction;
     (*st).shadow_t_max = FAR;
     if l.distance < FAR {
         (*st).shadow_t_max = l.distance - SHADOW_SHORTEN * l.distance - SHADOW_SHORTEN_ERRORS * s.error;
     }
+    let real_light = l.side == 0u;
     var request = REQUEST_SHADOW_MIXED;
-    if difference && real_light { request = REQUEST_SHADOW_DIFFERENCE; }
+    if (*st).mode == MODE_DIFFERENCE && real_light { request = REQUEST_SHADOW_DIFFERENCE; }
     if (*st).mode == MODE_REAL { request = REQUEST_SHADOW_REAL; }
     @if(paper) {
         if (*st).mode == MODE_SHARED && real_light { request = REQUEST_SHADOW_PAIR; }
@@ -131,7 +164,7 @@ fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: 
     (*st).pending |= PENDING_NEXT;
     (*st).next_direction = c.direction;
     (*st).next_throughput = (*st).throughput * f.f_cos * (1.0 / density);
-    (*st).next_density = density;
+    (*st).next_density = density / f32(light_draws(st));
 }
 
 fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
@@ -152,8 +185,8 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, ro
         (*st).difference_direction = b.wi;
         (*st).difference_lambertian = u32(bsdf_is_lambertian(s));
         (*st).difference_normal = s.ns;
-        (*st).difference_cone_probability = roulette.cone;
-        (*st).difference_density = density;
+        (*st).difference_cone_probability = roulette.cone / f32(light_draws(st));
+        (*st).difference_density = select(b.pdf / f32(light_draws(st)), DELTA_DENSITY, b.delta);
         (*st).difference_throughput = throughput * (1.0 / roulette.bsdf);
         return;
     }

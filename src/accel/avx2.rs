@@ -2,17 +2,18 @@
 
 use std::arch::x86_64::*;
 
-use super::trace::{BOX_MARGIN, Found, PROJECTED_SLACK, RayFrame, traversal};
-use super::wide::{LEAF, TriangleBlock, WideBvh, WideNode};
+use super::trace::{BOX_MARGIN, Found, PROJECTED_SLACK, RayFrame, Stack, traversal};
+use super::wide::{Eight, LEAF, TriangleBlock, WideBvh, WideNode};
 
 /// Nearest or any accepted hit. Call only where [`super::trace::Kernel::best`] found the instructions.
-pub(super) fn traverse<const ANY: bool, const STACK: usize>(
+pub(super) fn traverse<const ANY: bool>(
     tree: &WideBvh,
     frame: &RayFrame,
     found: Found,
+    stack: &mut Stack,
 ) -> Found {
     // SAFETY: `Kernel::Avx2` exists only where the processor has these features.
-    unsafe { kernel::<ANY, STACK>(tree, frame, found) }
+    unsafe { kernel::<ANY>(tree, frame, found, stack) }
 }
 
 traversal! {
@@ -24,7 +25,7 @@ traversal! {
 struct Lanes {
     origin: [__m256; 3],
     inv_direction: [__m256; 3],
-    near_row: [usize; 3],
+    near_side: [usize; 3],
     axes: [usize; 3],
     /// Origin in permuted order.
     sheared_origin: [__m256; 3],
@@ -36,6 +37,7 @@ impl Lanes {
     #[inline]
     #[target_feature(enable = "avx2,fma,bmi1,lzcnt,popcnt")]
     fn new(frame: &RayFrame) -> Lanes {
+        let along = |axis: usize| _mm256_set1_ps(frame.origin[axis.min(2)]);
         let [kx, ky, kz] = frame.axes;
         let origin = [
             _mm256_set1_ps(frame.origin[0]),
@@ -49,9 +51,9 @@ impl Lanes {
                 _mm256_set1_ps(frame.inv_direction[1]),
                 _mm256_set1_ps(frame.inv_direction[2]),
             ],
-            near_row: frame.near_row,
+            near_side: frame.near_side.map(|side| side & 1),
             axes: frame.axes,
-            sheared_origin: [origin[kx], origin[ky], origin[kz]],
+            sheared_origin: [along(kx), along(ky), along(kz)],
             shear: [
                 _mm256_set1_ps(frame.shear[0]),
                 _mm256_set1_ps(frame.shear[1]),
@@ -70,18 +72,18 @@ fn row(values: &[f32; 8]) -> __m256 {
 
 #[inline]
 #[target_feature(enable = "avx2,fma,bmi1,lzcnt,popcnt")]
-fn boxes(node: &WideNode, lanes: &Lanes, limit: f32) -> (u32, [f32; 8]) {
+fn boxes(node: &WideNode, lanes: &Lanes, limit: f32) -> (u32, Eight) {
     let mut near = lanes.t_min;
     let mut far = _mm256_set1_ps(limit);
     for axis in 0..3 {
-        let near_row = lanes.near_row[axis];
-        let plane = row(&node.rows[near_row]);
+        let near_side = lanes.near_side[axis] & 1;
+        let plane = row(&node.planes[axis][near_side]);
         let entry = _mm256_mul_ps(
             _mm256_sub_ps(plane, lanes.origin[axis]),
             lanes.inv_direction[axis],
         );
         near = _mm256_max_ps(entry, near);
-        let plane = row(&node.rows[near_row ^ 1]);
+        let plane = row(&node.planes[axis][near_side ^ 1]);
         let exit = _mm256_mul_ps(
             _mm256_sub_ps(plane, lanes.origin[axis]),
             lanes.inv_direction[axis],
@@ -113,8 +115,9 @@ fn edge(a: __m256, b: __m256, c: __m256, d: __m256) -> __m256 {
 #[inline]
 #[target_feature(enable = "avx2,fma,bmi1,lzcnt,popcnt")]
 fn vertex(block: &TriangleBlock, lanes: &Lanes, index: usize) -> [__m256; 3] {
-    let [kx, ky, kz] = lanes.axes;
-    let offset = |axis: usize| row(&block.rows[3 * index + axis]);
+    // The bound is known, but not to the compiler, which otherwise checks each row.
+    let [kx, ky, kz] = lanes.axes.map(|axis| axis.min(2));
+    let offset = |axis: usize| row(&block.rows[index][axis]);
     let x = _mm256_sub_ps(offset(kx), lanes.sheared_origin[0]);
     let y = _mm256_sub_ps(offset(ky), lanes.sheared_origin[1]);
     let z = _mm256_sub_ps(offset(kz), lanes.sheared_origin[2]);
@@ -127,7 +130,7 @@ fn vertex(block: &TriangleBlock, lanes: &Lanes, index: usize) -> [__m256; 3] {
 
 #[inline]
 #[target_feature(enable = "avx2,fma,bmi1,lzcnt,popcnt")]
-fn block(block: &TriangleBlock, lanes: &Lanes, limit: f32) -> (u32, [f32; 8]) {
+fn block(block: &TriangleBlock, lanes: &Lanes, limit: f32) -> (u32, [Eight; 3]) {
     let [ax, ay, az] = vertex(block, lanes, 0);
     let [bx, by, bz] = vertex(block, lanes, 1);
     let [cx, cy, cz] = vertex(block, lanes, 2);
@@ -143,12 +146,14 @@ fn block(block: &TriangleBlock, lanes: &Lanes, limit: f32) -> (u32, [f32; 8]) {
     );
     let inside = _mm256_and_ps(inside, _mm256_cmp_ps::<_CMP_NEQ_UQ>(det, zero));
     if _mm256_movemask_ps(inside) == 0 {
-        return (0, [0.0; 8]);
+        return (0, [Eight([0.0; 8]); 3]);
     }
     let inv_det = _mm256_div_ps(_mm256_set1_ps(1.0), det);
+    let second = _mm256_mul_ps(v, inv_det);
+    let third = _mm256_mul_ps(w, inv_det);
     let a_part = _mm256_mul_ps(_mm256_mul_ps(u, inv_det), az);
-    let b_part = _mm256_mul_ps(_mm256_mul_ps(v, inv_det), bz);
-    let c_part = _mm256_mul_ps(_mm256_mul_ps(w, inv_det), cz);
+    let b_part = _mm256_mul_ps(second, bz);
+    let c_part = _mm256_mul_ps(third, cz);
     let t = _mm256_mul_ps(
         _mm256_add_ps(_mm256_add_ps(a_part, b_part), c_part),
         lanes.shear[2],
@@ -159,7 +164,7 @@ fn block(block: &TriangleBlock, lanes: &Lanes, limit: f32) -> (u32, [f32; 8]) {
     );
     let hit = _mm256_and_ps(inside, within);
     if _mm256_movemask_ps(hit) == 0 {
-        return (0, [0.0; 8]);
+        return (0, [Eight([0.0; 8]); 3]);
     }
     let sign = _mm256_set1_ps(-0.0);
     let size = |value: __m256| _mm256_andnot_ps(sign, value);
@@ -182,7 +187,7 @@ fn block(block: &TriangleBlock, lanes: &Lanes, limit: f32) -> (u32, [f32; 8]) {
         ),
     );
     let mask = _mm256_movemask_ps(_mm256_and_ps(hit, bounded));
-    (mask as u32, bytemuck::cast(t))
+    (mask as u32, [t, second, third].map(bytemuck::cast))
 }
 
 /// Asks for the cache lines of a node or of a leaf's first block.

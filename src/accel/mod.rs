@@ -7,10 +7,11 @@
 //!
 //! # Why no hit is lost
 //!
-//! With u = 2^-24 the test computes sheared coordinates whose error is at most 4u times the hit's offset from the origin on that axis plus
-//! 10u times the triangle's largest extent, and its distance is off by at most 5u times the distance plus 5u times the extent. Each
-//! triangle's box is therefore enlarged by at least 16u times its extent (`binary`), and box distances, themselves off by 3u, are compared
-//! with a margin of 16u (`trace`). The GPU adds the error of its decompression (`compressed`).
+//! With u = 2^-24 the test computes sheared coordinates whose error is at most 5u times the hit's offset from the origin on that axis plus
+//! 10u times the triangle's largest extent, and the distance of a point of the triangle, off by at most 5u times the distance plus 5u times
+//! the extent. Each triangle's box is therefore enlarged by at least 16u times its extent (`binary`), and box distances, themselves off by
+//! 3u, are compared with a margin of 16u (`trace`). The GPU adds the error of its decompression (`compressed`). Which point of the triangle
+//! that is depends on the weights, which are as good as the triangle is wide: for slivers, distances err by u times extent squared over width.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

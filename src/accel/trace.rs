@@ -1,8 +1,9 @@
 //! Traversal of the CPU's tree and the triangle test. Twin of `shaders/trace.wgsl`: the triangle test there does the same f32 operations.
 
-use super::wide::{TriangleBlock, WideBvh, WideNode};
+use std::cell::RefCell;
+
+use super::wide::{Eight, MAX_LEVELS, TriangleBlock, WideBvh, WideNode};
 use super::{Hit, Ray};
-use crate::packed::NONE;
 
 /// Factor by which a box may be farther than a hit: 16 units of rounding (see the module's proof).
 pub(super) const BOX_MARGIN: f32 = 1.0 + 1.0 / (1 << 20) as f32;
@@ -38,8 +39,8 @@ impl Kernel {
 pub(super) struct RayFrame {
     pub(super) origin: [f32; 3],
     pub(super) inv_direction: [f32; 3],
-    /// Row of each axis' nearer planes in a node.
-    pub(super) near_row: [usize; 3],
+    /// By axis: 0 if the low planes are nearer, 1 if the high ones are.
+    pub(super) near_side: [usize; 3],
     /// Axis permutation: the last one is the direction's largest component.
     pub(super) axes: [usize; 3],
     /// Shear that takes the direction to the last axis, and the scale along it.
@@ -51,6 +52,7 @@ pub(super) struct RayFrame {
 
 impl RayFrame {
     /// `None` for a ray that hits nothing whatever there is: not finite, without direction or with an empty interval.
+    #[inline]
     fn new(ray: &Ray) -> Option<RayFrame> {
         let origin = ray.origin.to_array();
         // -0 + 0 is +0, so that both zeros take the same inverse.
@@ -68,18 +70,20 @@ impl RayFrame {
             return None;
         }
         let axes = [(largest + 1) % 3, (largest + 2) % 3, largest];
-        let along = direction[largest];
+        let inv_direction = direction.map(|d| 1.0 / d);
+        let scale = inv_direction[largest];
         Some(RayFrame {
             origin,
-            inv_direction: direction.map(|d| 1.0 / d),
-            near_row: [0, 1, 2].map(|axis| 2 * axis + usize::from(direction[axis] < 0.0)),
+            inv_direction,
+            near_side: direction.map(|d| usize::from(d < 0.0)),
             axes,
             shear: [
-                direction[axes[0]] / along,
-                direction[axes[1]] / along,
-                1.0 / along,
+                direction[axes[0]] * scale,
+                direction[axes[1]] * scale,
+                scale,
             ],
-            t_min: ray.t_min,
+            // Without a sign, so that the bits of distances sort as they do.
+            t_min: ray.t_min + 0.0,
             t_max: ray.t_max,
             skip: ray.skip,
         })
@@ -90,9 +94,10 @@ impl RayFrame {
 #[derive(Clone, Copy)]
 pub(super) struct Found {
     pub(super) t: f32,
+    /// Weights of the second and third vertex.
+    pub(super) weights: [f32; 2],
     pub(super) id: u32,
-    /// Block << 3 | lane, [`NONE`] for none.
-    pub(super) place: u32,
+    pub(super) any: bool,
 }
 
 impl Found {
@@ -101,7 +106,8 @@ impl Found {
             t: frame.t_max,
             // No id is smaller: a hit at exactly t_max is not accepted.
             id: 0,
-            place: NONE,
+            weights: [0.0; 2],
+            any: false,
         }
     }
 
@@ -112,22 +118,30 @@ impl Found {
     }
 }
 
-/// Defines a traversal `fn NAME<const ANY: bool, const STACK: usize>(&WideBvh, &RayFrame, Found) -> Found`.
+/// Children that wait: bits of the distance << 32 | child word.
+pub(super) type Stack = [u64; 7 * MAX_LEVELS + 1];
+
+thread_local! {
+    // Kept between rays, because clearing it would cost more than many of them.
+    static STACK: RefCell<Stack> = const { RefCell::new([0; 7 * MAX_LEVELS + 1]) };
+}
+
+/// Defines a traversal `fn NAME<const ANY: bool>(&WideBvh, &RayFrame, Found, &mut Stack) -> Found`.
 ///
 /// `$boxes(node, lanes, limit)` returns the mask of children entered before `limit` and their distances; `$block(block, lanes, limit)` the
-/// mask of triangles hit in [t_min, limit] and their distances; `$lanes` makes the vector form of a ray; `$prefetch(tree, child)` may
+/// mask of triangles hit in [t_min, limit], their distances and the weights of their second and third vertices; `$lanes` makes the vector form of a ray; `$prefetch(tree, child)` may
 /// fetch a child that waits.
 macro_rules! traversal {
     ($(#[$attribute:meta])* fn $name:ident($lanes:path, $boxes:path, $block:path, $prefetch:path)) => {
         $(#[$attribute])*
-        fn $name<const ANY: bool, const STACK: usize>(
+        fn $name<const ANY: bool>(
             tree: &$crate::accel::wide::WideBvh,
             frame: &$crate::accel::trace::RayFrame,
             mut found: $crate::accel::trace::Found,
+            stack: &mut $crate::accel::trace::Stack,
         ) -> $crate::accel::trace::Found {
             use $crate::accel::{trace::BOX_MARGIN, wide::LEAF};
             let lanes = $lanes(frame);
-            let mut stack = [0u64; STACK];
             let mut waiting = 0;
             let mut child = 0u32;
             loop {
@@ -137,35 +151,41 @@ macro_rules! traversal {
                     if mask != 0 {
                         let mut lane = mask.trailing_zeros() as usize & 7;
                         mask &= mask - 1;
-                        child = node.children[lane];
-                        let mut nearest = near[lane];
+                        if mask == 0 {
+                            child = node.children[lane];
+                            continue;
+                        }
+                        let entry = |lane: usize| {
+                            u64::from(near.0[lane].to_bits()) << 32 | u64::from(node.children[lane])
+                        };
+                        let mut nearest = entry(lane);
                         while mask != 0 {
                             lane = mask.trailing_zeros() as usize & 7;
                             mask &= mask - 1;
-                            let (mut far_child, mut far) = (node.children[lane], near[lane]);
-                            if far < nearest {
-                                std::mem::swap(&mut far_child, &mut child);
-                                std::mem::swap(&mut far, &mut nearest);
-                            }
-                            $prefetch(tree, far_child);
-                            stack[waiting] = u64::from(far.to_bits()) << 32 | u64::from(far_child);
+                            let other = entry(lane);
+                            let farther = nearest.max(other);
+                            nearest = nearest.min(other);
+                            $prefetch(tree, farther as u32);
+                            stack[waiting] = farther;
                             waiting += 1;
                         }
+                        child = nearest as u32;
                         continue;
                     }
                 } else {
                     let first = (child & !LEAF) >> 3;
-                    for block_index in first..=first + (child & 7) {
+                    for block_index in first..first + (child & 7) + 1 {
                         let block = &tree.blocks[block_index as usize];
-                        let (mut mask, distances) = $block(block, &lanes, found.t);
+                        let (mut mask, [distances, second, third]) = $block(block, &lanes, found.t);
                         while mask != 0 {
                             let lane = mask.trailing_zeros() as usize & 7;
                             mask &= mask - 1;
-                            let (t, id) = (distances[lane], block.ids[lane]);
+                            let (t, id) = (distances.0[lane], block.ids[lane]);
                             if found.accepts(frame, t, id) {
                                 found.t = t;
                                 found.id = id;
-                                found.place = block_index << 3 | lane as u32;
+                                found.weights = [second.0[lane], third.0[lane]];
+                                found.any = true;
                                 if ANY {
                                     return found;
                                 }
@@ -191,21 +211,13 @@ macro_rules! traversal {
 }
 pub(super) use traversal;
 
-/// Most entries in the stack that most trees need; clearing a larger one costs time on every ray.
-const SMALL_STACK: usize = 128;
-const LARGE_STACK: usize = 7 * super::wide::MAX_LEVELS + 1;
-
 fn traverse<const ANY: bool>(tree: &WideBvh, kernel: Kernel, frame: &RayFrame) -> Found {
     let found = Found::none(frame);
-    let small = 7 * tree.levels < SMALL_STACK;
-    match (kernel, small) {
-        (Kernel::Portable, true) => portable::<ANY, SMALL_STACK>(tree, frame, found),
-        (Kernel::Portable, false) => portable::<ANY, LARGE_STACK>(tree, frame, found),
+    STACK.with_borrow_mut(|stack| match kernel {
+        Kernel::Portable => portable::<ANY>(tree, frame, found, stack),
         #[cfg(target_arch = "x86_64")]
-        (Kernel::Avx2, true) => super::avx2::traverse::<ANY, SMALL_STACK>(tree, frame, found),
-        #[cfg(target_arch = "x86_64")]
-        (Kernel::Avx2, false) => super::avx2::traverse::<ANY, LARGE_STACK>(tree, frame, found),
-    }
+        Kernel::Avx2 => super::avx2::traverse::<ANY>(tree, frame, found, stack),
+    })
 }
 
 pub(super) fn closest(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> Hit {
@@ -213,24 +225,19 @@ pub(super) fn closest(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> Hit {
         return Hit::MISS;
     };
     let found = traverse::<false>(tree, kernel, &frame);
-    if found.place == NONE {
+    if !found.any {
         return Hit::MISS;
     }
-    let block = &tree.blocks[(found.place >> 3) as usize];
-    let projected = project(block, &frame, (found.place & 7) as usize);
     Hit {
         t: found.t,
-        u: projected.weights[1],
-        v: projected.weights[2],
+        u: found.weights[0],
+        v: found.weights[1],
         triangle: found.id,
     }
 }
 
 pub(super) fn any(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> bool {
-    RayFrame::new(ray).is_some_and(|frame| {
-        let found = traverse::<true>(tree, kernel, &frame);
-        found.place != NONE
-    })
+    RayFrame::new(ray).is_some_and(|frame| traverse::<true>(tree, kernel, &frame).any)
 }
 
 /// One triangle seen along the ray.
@@ -250,9 +257,9 @@ fn project(block: &TriangleBlock, frame: &RayFrame, lane: usize) -> Projected {
     let [kx, ky, kz] = frame.axes;
     let [shear_x, shear_y, scale] = frame.shear;
     let vertex = |i: usize| {
-        let x = block.rows[3 * i + kx][lane] - frame.origin[kx];
-        let y = block.rows[3 * i + ky][lane] - frame.origin[ky];
-        let z = block.rows[3 * i + kz][lane] - frame.origin[kz];
+        let x = block.rows[i][kx][lane] - frame.origin[kx];
+        let y = block.rows[i][ky][lane] - frame.origin[ky];
+        let z = block.rows[i][kz][lane] - frame.origin[kz];
         [x - shear_x * z, y - shear_y * z, z]
     };
     let [ax, ay, az] = vertex(0);
@@ -304,12 +311,13 @@ fn nothing(_: &WideBvh, _: u32) {}
 
 /// A plane through an origin that moves along it gives 0 * inf = NaN, which `min` and `max` pass over: no constraint.
 #[inline(always)]
-fn portable_boxes(node: &WideNode, frame: &&RayFrame, limit: f32) -> (u32, [f32; 8]) {
+fn portable_boxes(node: &WideNode, frame: &&RayFrame, limit: f32) -> (u32, Eight) {
     let mut near = [frame.t_min; 8];
     let mut far = [limit; 8];
     for axis in 0..3 {
-        let near_row = &node.rows[frame.near_row[axis]];
-        let far_row = &node.rows[frame.near_row[axis] ^ 1];
+        let near_side = frame.near_side[axis] & 1;
+        let near_row = &node.planes[axis][near_side];
+        let far_row = &node.planes[axis][near_side ^ 1];
         let (origin, inverse) = (frame.origin[axis], frame.inv_direction[axis]);
         for lane in 0..8 {
             near[lane] = max((near_row[lane] - origin) * inverse, near[lane]);
@@ -320,18 +328,20 @@ fn portable_boxes(node: &WideNode, frame: &&RayFrame, limit: f32) -> (u32, [f32;
     for lane in 0..8 {
         mask |= u32::from(near[lane] <= far[lane] * BOX_MARGIN) << lane;
     }
-    (mask, near)
+    (mask, Eight(near))
 }
 
 #[inline(always)]
-fn portable_block(block: &TriangleBlock, frame: &&RayFrame, limit: f32) -> (u32, [f32; 8]) {
+fn portable_block(block: &TriangleBlock, frame: &&RayFrame, limit: f32) -> (u32, [Eight; 3]) {
     let mut mask = 0;
-    let mut distances = [0.0; 8];
+    let mut results = [Eight([0.0; 8]); 3];
     for lane in 0..8 {
         let projected = project(block, frame, lane);
         let within = projected.t >= frame.t_min && projected.t <= limit;
         mask |= u32::from(projected.hit && within) << lane;
-        distances[lane] = projected.t;
+        results[0].0[lane] = projected.t;
+        results[1].0[lane] = projected.weights[1];
+        results[2].0[lane] = projected.weights[2];
     }
-    (mask, distances)
+    (mask, results)
 }

@@ -7,10 +7,15 @@ use obvhs::bvh2::Bvh2;
 /// High bit of a child word: the child is a leaf, the rest is first block << 3 | blocks - 1. Without it the word is a node index.
 pub(super) const LEAF: u32 = 1 << 31;
 
-/// Deepest tree that the larger traversal stack serves: each level leaves at most seven children waiting.
+/// Deepest tree that the traversal stack serves: each level leaves at most seven children waiting.
 pub(super) const MAX_LEVELS: usize = 73;
 
 const WIDTH: usize = 8;
+/// Eight numbers where one instruction can load or store them.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C, align(32))]
+pub(super) struct Eight(pub(super) [f32; WIDTH]);
+
 const MAX_LEAF_TRIANGLES: u32 = 16;
 /// Cost of a triangle block relative to a node.
 const BLOCK_COST: f32 = 0.3;
@@ -19,8 +24,8 @@ const BLOCK_COST: f32 = 0.3;
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct WideNode {
-    /// Low x, high x, low y, high y, low z, high z.
-    pub(super) rows: [[f32; WIDTH]; 6],
+    /// By axis: low planes, high planes.
+    pub(super) planes: [[[f32; WIDTH]; 2]; 3],
     pub(super) children: [u32; WIDTH],
 }
 
@@ -28,8 +33,8 @@ pub(super) struct WideNode {
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct TriangleBlock {
-    /// Row 3 * vertex + axis.
-    pub(super) rows: [[f32; WIDTH]; 9],
+    /// By vertex and axis.
+    pub(super) rows: [[[f32; WIDTH]; 3]; 3],
     pub(super) ids: [u32; WIDTH],
 }
 
@@ -37,21 +42,15 @@ pub(super) struct WideBvh {
     pub(super) nodes: Vec<WideNode>,
     /// Block 0 is the all-zero one.
     pub(super) blocks: Vec<TriangleBlock>,
-    /// Nodes on the longest path.
-    pub(super) levels: usize,
 }
 
 const EMPTY_NODE: WideNode = WideNode {
-    rows: {
-        let low = [f32::INFINITY; WIDTH];
-        let high = [f32::NEG_INFINITY; WIDTH];
-        [low, high, low, high, low, high]
-    },
+    planes: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3],
     children: [LEAF; WIDTH],
 };
 
 const ZERO_BLOCK: TriangleBlock = TriangleBlock {
-    rows: [[0.0; WIDTH]; 9],
+    rows: [[[0.0; WIDTH]; 3]; 3],
     ids: [0; WIDTH],
 };
 
@@ -74,7 +73,6 @@ impl WideBvh {
         WideBvh {
             nodes: vec![EMPTY_NODE],
             blocks: vec![ZERO_BLOCK],
-            levels: 1,
         }
     }
 
@@ -88,7 +86,6 @@ impl WideBvh {
             if level > MAX_LEVELS {
                 return None;
             }
-            wide.levels = wide.levels.max(level);
             let mut children = wide_children(tree, &choices, source);
             children.sort_by(|&a, &b| {
                 let area = |n: u32| tree.nodes[n as usize].aabb().half_area();
@@ -106,8 +103,8 @@ impl WideBvh {
                 };
                 let node = &mut wide.nodes[target];
                 for axis in 0..3 {
-                    node.rows[2 * axis][slot] = bounds.min[axis];
-                    node.rows[2 * axis + 1][slot] = bounds.max[axis];
+                    node.planes[axis][0][slot] = bounds.min[axis];
+                    node.planes[axis][1][slot] = bounds.max[axis];
                 }
                 node.children[slot] = word;
             }
@@ -134,7 +131,7 @@ impl WideBvh {
             let lane = count % WIDTH;
             for (vertex, position) in triangles[triangle as usize].iter().enumerate() {
                 for axis in 0..3 {
-                    block.rows[3 * vertex + axis][lane] = position[axis];
+                    block.rows[vertex][axis][lane] = position[axis];
                 }
             }
             block.ids[lane] = first_id + triangle;

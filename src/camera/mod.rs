@@ -5,4 +5,4 @@ pub mod lens;
 pub mod sampler;
 
 #[cfg(test)]
-mod chi_squared;
+pub mod chi_squared;

@@ -6,20 +6,31 @@ use super::state::*;
 use crate::camera::sampler::{SampleKey, sample_4d};
 use crate::packed::PackedScene;
 
-// Sample sets: 0 is pixel and lens, 1 the primary roulette, then five a depth from 8 on.
+// Sample sets: 0 is pixel and lens, 1 the primary roulette, then six a depth from 8 on.
 pub const SET_PRIMARY_ROULETTE: u32 = 1;
 pub const SET_DIFFERENCE_LIGHT: u32 = 0;
 pub const SET_DIFFERENCE_BSDF: u32 = 1;
 pub const SET_DIFFERENCE_CONE: u32 = 2;
 pub const SET_PATH_LIGHT: u32 = 3;
 pub const SET_PATH_BSDF: u32 = 4;
+pub const SET_DIFFERENCE_CHOICE: u32 = 5;
+const SETS_PER_DEPTH: u32 = 6;
+const FIRST_DEPTH_SET: u32 = 2;
 
 pub const ESTIMATOR_DIRECT: u32 = 0;
 pub const ESTIMATOR_PAPER: u32 = 1;
 
 /// Random numbers of one decision at the present vertex.
 pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> [f32; 4] {
-    sample_4d(sample_key(scene, st), 3 + st.depth * 5 + purpose)
+    draw_of(scene, st, purpose, 0, 1)
+}
+
+/// Random numbers of number `j` of `count` equal decisions: together, those of all samples are one well-spread set.
+pub fn draw_of(scene: &PackedScene, st: &PathState, purpose: u32, j: u32, count: u32) -> [f32; 4] {
+    let mut key = sample_key(scene, st);
+    key.index = key.index * count + j;
+    key.total *= count;
+    sample_4d(key, FIRST_DEPTH_SET + st.depth * SETS_PER_DEPTH + purpose)
 }
 
 pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {

@@ -62,17 +62,8 @@ pub fn advance(scene: &PackedScene, st: &mut PathState) {
         STAGE_PATH => goes_on = path_hit(scene, st),
         STAGE_PATH_SHADOW => path_shadow(scene, st),
         STAGE_PAPER_BEHIND => paper_behind(scene, st),
-        STAGE_DIFFERENCE_SHADOW => {
-            if shadow_counts(st) {
-                st.radiance += st.shadow_contribution;
-            }
-        }
-        STAGE_DIFFERENCE_CONE => {
-            // Counts only where virtual geometry is nearer.
-            if virtual_is_nearer(st.hit_virtual, st.hit_real) {
-                split_difference(scene, st);
-            }
-        }
+        STAGE_DIFFERENCE_SHADOW => difference_shadow(st),
+        STAGE_DIFFERENCE_CONE => difference_cone(scene, st),
         STAGE_DIFFERENCE_BSDF => difference_bsdf(scene, st),
         STAGE_REAL_PASS => real_pass(scene, st),
         _ => {}
@@ -303,13 +294,19 @@ fn path_shadow(scene: &PackedScene, st: &mut PathState) {
 }
 
 /// A difference shadow ray contributes where only something virtual blocks a real light, or where nothing blocks a virtual one.
-fn shadow_counts(st: &PathState) -> bool {
+fn difference_shadow(st: &mut PathState) {
     let open_real = st.hit_real.triangle == NONE;
     let open_virtual = st.hit_virtual.triangle == NONE;
-    if st.shadow_request == REQUEST_SHADOW_DIFFERENCE {
-        !open_virtual && open_real
-    } else {
-        open_virtual && open_real
+    let blocked_alone = st.shadow_request == REQUEST_SHADOW_DIFFERENCE;
+    if open_real && open_virtual != blocked_alone {
+        st.radiance += st.shadow_contribution;
+    }
+}
+
+/// A direction inside the cones counts only where virtual geometry is nearer.
+fn difference_cone(scene: &PackedScene, st: &mut PathState) {
+    if virtual_is_nearer(st.hit_virtual, st.hit_real) {
+        split_difference(scene, st);
     }
 }
 

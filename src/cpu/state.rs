@@ -116,7 +116,8 @@ pub struct PathState {
     // The path being followed.
     pub vertex_hit: Hit,
     pub throughput: Vec3,
-    /// Sum of the densities of the techniques that could have drawn the present direction; DELTA_DENSITY: one only.
+    /// Sum of the densities of the techniques that could have drawn the present direction, over the number of lights drawn at the vertex it
+    /// leaves (so that it compares with one light's density); DELTA_DENSITY: one technique only.
     pub density: f32,
 
     // A vertex's shadow ray and its continuation.
@@ -145,7 +146,8 @@ pub struct PathState {
     pub difference_throughput: Vec3,
     /// The vertex is Lambertian: what the cones cover is left to them.
     pub difference_lambertian: bool,
-    /// Shading normal and roulette probability of the cones at that vertex, to weigh a BSDF direction against them.
+    /// Shading normal and roulette probability of the cones (over the number of lights drawn) at that vertex, to weigh a BSDF direction
+    /// against them.
     pub difference_normal: Vec3,
     pub difference_cone_probability: f32,
 

@@ -7,7 +7,7 @@ use super::state::*;
 use crate::light::cones::{
     cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
 };
-use crate::light::lights::{light_pdf_hit, light_sample};
+use crate::light::lights::{LightSample, light_pdf_hit, light_sample};
 use crate::material::{
     Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample,
 };
@@ -28,6 +28,8 @@ const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
 const SHADOW_SHORTEN: f32 = 2e-5;
 const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
+/// Lights drawn at the first difference vertex, of which one is traced: most directions meet nothing virtual and cost no ray.
+const DIFFERENCE_LIGHTS: u32 = 4;
 /// Surfaces that scatter nothing.
 const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
 
@@ -98,40 +100,84 @@ fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: 
     if s.light != NONE && st.density != DELTA_DENSITY {
         weight = density_weight(
             st.density,
-            light_pdf_hit(scene, s.light, st.direction, distance),
+            light_pdf_hit(
+                scene,
+                s.light,
+                s.position - st.direction * distance,
+                st.direction,
+                distance,
+            ),
         );
     }
     let light = st.throughput * s.emission * weight;
     accumulate(scene, st, light);
 }
 
-/// Draws a light and plans its shadow ray. At a difference vertex the technique competes with the cones (at their effective density) and,
-/// unless the surface is Lambertian, with the BSDF.
+/// Lights drawn at the present vertex.
+fn light_draws(st: &PathState) -> u32 {
+    if st.mode == MODE_DIFFERENCE && st.depth == 1 {
+        DIFFERENCE_LIGHTS
+    } else {
+        1
+    }
+}
+
+/// Draws lights and plans one shadow ray, to the light chosen in proportion to what it would contribute (resampled importance sampling,
+/// Talbot 2005). At a difference vertex the technique competes with the cones (at their effective density) and, unless the surface is
+/// Lambertian, with the BSDF.
 fn next_event(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, roulette: Roulette) {
     if scene.frame.light_count == 0 || bsdf_is_delta(s) {
         return;
     }
     let difference = st.mode == MODE_DIFFERENCE;
-    let u = draw(
-        scene,
-        st,
-        if difference {
-            SET_DIFFERENCE_LIGHT
-        } else {
-            SET_PATH_LIGHT
-        },
-    );
-    let l = light_sample(scene, s.position, u);
+    let set = if difference {
+        SET_DIFFERENCE_LIGHT
+    } else {
+        SET_PATH_LIGHT
+    };
+    let count = light_draws(st);
+    let mut choice = [0.0; 4];
+    if count > 1 {
+        choice = draw(scene, st, SET_DIFFERENCE_CHOICE);
+    }
+    let mut sum = 0.0;
+    let mut chosen_size = 1.0;
+    let mut contribution = Vec3::ZERO;
+    for j in 0..count {
+        let l = light_sample(scene, s.position, draw_of(scene, st, set, j, count));
+        let candidate = light_contribution(scene, st, s, wo, roulette, &l, count as f32);
+        let size = candidate.abs().max_element();
+        sum += size;
+        if size > 0.0 && choice[j as usize] * sum < size {
+            contribution = candidate;
+            chosen_size = size;
+            plan_shadow(st, s, &l);
+        }
+    }
+    st.shadow_contribution = contribution * (sum / (chosen_size * count as f32));
+}
+
+/// What a drawn light adds if nothing hides it (or, for the difference, if only something virtual does); zero if that cannot be.
+fn light_contribution(
+    scene: &PackedScene,
+    st: &PathState,
+    s: &Surface,
+    wo: Vec3,
+    roulette: Roulette,
+    l: &LightSample,
+    count: f32,
+) -> Vec3 {
+    let difference = st.mode == MODE_DIFFERENCE;
     let real_light = l.side == 0;
     if l.pdf <= 0.0 || (st.mode == MODE_REAL && !real_light) {
-        return;
+        return Vec3::ZERO;
     }
     if difference && real_light && !direction_meets_spheres(&scene.frame, s.position, l.direction) {
-        return;
+        return Vec3::ZERO;
     }
     let f = bsdf_eval(s, wo, l.direction);
     if f.f_cos.max_element() <= 0.0 {
-        return;
+        return Vec3::ZERO;
     }
     let mut weight = 1.0;
     if !l.delta {
@@ -142,16 +188,20 @@ fn next_event(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, ro
                 other += f.pdf;
             }
         }
-        weight = l.pdf / (l.pdf + other);
+        weight = count * l.pdf / (count * l.pdf + other);
     }
     let sign = if difference && real_light { -1.0 } else { 1.0 };
-    st.shadow_contribution = st.throughput * f.f_cos * l.radiance * (sign * weight / l.pdf);
+    st.throughput * f.f_cos * l.radiance * (sign * weight / l.pdf)
+}
+
+fn plan_shadow(st: &mut PathState, s: &Surface, l: &LightSample) {
     st.shadow_direction = l.direction;
     st.shadow_t_max = if l.distance < f32::INFINITY {
         l.distance - SHADOW_SHORTEN * l.distance - SHADOW_SHORTEN_ERRORS * s.error
     } else {
         f32::INFINITY
     };
+    let real_light = l.side == 0;
     st.shadow_request = match st.mode {
         MODE_DIFFERENCE if real_light => REQUEST_SHADOW_DIFFERENCE,
         MODE_REAL => REQUEST_SHADOW_REAL,
@@ -182,7 +232,7 @@ fn plan_cone(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, rou
     st.pending |= PENDING_NEXT;
     st.next_direction = c.direction;
     st.next_throughput = st.throughput * f.f_cos * (1.0 / density);
-    st.next_density = density;
+    st.next_density = density / light_draws(st) as f32;
 }
 
 /// The BSDF's own direction: the path's next ray, or (c) the recursion of the difference.
@@ -224,8 +274,12 @@ fn plan_continuation(
         st.difference_direction = b.wi;
         st.difference_lambertian = bsdf_is_lambertian(s);
         st.difference_normal = s.ns;
-        st.difference_cone_probability = roulette.cone;
-        st.difference_density = density;
+        st.difference_cone_probability = roulette.cone / light_draws(st) as f32;
+        st.difference_density = if b.delta {
+            DELTA_DENSITY
+        } else {
+            b.pdf / light_draws(st) as f32
+        };
         st.difference_throughput = throughput * (1.0 / roulette.bsdf);
         return;
     }

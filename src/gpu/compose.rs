@@ -32,6 +32,7 @@ pub const MODULES: &[(&str, &str)] = &[
     ("lights", include_str!("../../shaders/lights.wgsl")),
     ("math", include_str!("../../shaders/math.wgsl")),
     ("normal", include_str!("../../shaders/normal.wgsl")),
+    ("rectangle", include_str!("../../shaders/rectangle.wgsl")),
     ("request", include_str!("../../shaders/request.wgsl")),
     ("sampler", include_str!("../../shaders/sampler.wgsl")),
     ("state", include_str!("../../shaders/state.wgsl")),

@@ -12,8 +12,15 @@ use crate::packed::Frame;
 
 /// Cones with a squared sine above this are sampled as the hemisphere: uniform sampling would waste what lies below the horizon.
 const WIDE_SIN2: f32 = 0.5;
-/// Relative widening of a sphere where rounding must not let a direction that meets it be missed.
-const PADDING: f32 = 1e-5;
+/// Widening of a cone, relative to its squared sine and absolute for the rounding of directions: a direction drawn at the rim stays inside.
+const CONE_PADDING: f32 = 1e-5;
+const CONE_PADDING_SIN2: f32 = 1e-9;
+/// Widening of a sphere's squared radius, relative to itself and to the squared distance: (r + e d)^2 <= r^2 (1 + k) + d^2 e^2 (1 + 1 / k)
+/// with k = 1e-3 and e = 4e-7, more than the rounding of the cross product.
+const SPHERE_PADDING: f32 = 1e-3;
+const SPHERE_PADDING_DISTANCE2: f32 = 2e-10;
+/// The largest cosine in a cone is overestimated by more than its rounding, so that no cone that reaches above the horizon counts as below.
+const COSINE_PADDING: f32 = 1e-6;
 
 /// One sphere seen from a point.
 struct Cone {
@@ -57,7 +64,7 @@ fn cone_of(frame: &Frame, i: u32, position: Vec3, ns: Vec3) -> Cone {
         sin2,
         one_minus_cos,
         wide: false,
-        weight: (2.0 * one_minus_cos * largest).max(0.0),
+        weight: (2.0 * one_minus_cos * (largest + COSINE_PADDING)).max(0.0),
     }
 }
 
@@ -129,7 +136,8 @@ pub fn cone_pdf(frame: &Frame, position: Vec3, ns: Vec3, direction: Vec3) -> f32
 /// By the cross product, whose relative precision holds for cones of any width.
 fn inside(cone: &Cone, direction: Vec3) -> bool {
     let across = cross3(direction, cone.axis);
-    dot3(direction, cone.axis) > 0.0 && dot3(across, across) <= cone.sin2 * (1.0 + PADDING)
+    dot3(direction, cone.axis) > 0.0
+        && dot3(across, across) <= cone.sin2 * (1.0 + CONE_PADDING) + CONE_PADDING_SIN2
 }
 
 /// Upper estimate, in 0..1, of the cosine-weighted share of the hemisphere about `ns` that virtual geometry covers.
@@ -146,8 +154,10 @@ pub fn direction_meets_spheres(frame: &Frame, position: Vec3, direction: Vec3) -
     for i in 0..frame.sphere_count {
         let sphere = frame.spheres[i as usize];
         let to_centre = Vec3::new(sphere[0], sphere[1], sphere[2]) - position;
-        let radius_squared = sphere[3] * sphere[3] * (1.0 + PADDING);
-        if dot3(to_centre, to_centre) <= radius_squared {
+        let distance_squared = dot3(to_centre, to_centre);
+        let radius_squared = sphere[3] * sphere[3] * (1.0 + SPHERE_PADDING)
+            + distance_squared * SPHERE_PADDING_DISTANCE2;
+        if distance_squared <= radius_squared {
             return true;
         }
         let across = cross3(direction, to_centre);

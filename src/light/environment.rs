@@ -3,14 +3,14 @@
 //! The map is bilinear between texel centres, wraps in u and is constant beyond the first and last row of centres. It is sampled by cells, the
 //! rectangles between neighbouring centres: column i lies between the centres of texels i and i + 1, row j between those of j - 1 and j. A cell
 //! is drawn with probability proportional to the mean luminance of its four corners times its solid angle (a row by the marginal, a column by
-//! the conditional distribution), the direction within it uniformly in azimuth and cosine, so its density is the mean luminance times one
-//! constant.
+//! the conditional distribution). Within it the density is bilinear in azimuth and cosine between the corners' luminances, so that the density
+//! everywhere is an interpolated luminance times one constant, continuous across cells, and a grey map is drawn almost exactly in proportion.
 
 use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use crate::math::{acos_, atan2_, luminance, safe_sqrt, sincos_2pi};
+use crate::math::{atan2_, luminance, safe_sqrt, sincos_2pi};
 use crate::packed::{Frame, PackedScene};
 
 /// Cumulative distributions for sampling a map by brightness.
@@ -97,7 +97,8 @@ fn env_coordinates(frame: &Frame, direction: Vec3) -> (f32, f32) {
     let x = direction.x * frame.env_cos - direction.z * frame.env_sin;
     let z = direction.x * frame.env_sin + direction.z * frame.env_cos;
     let u = 0.5 + atan2_(x, -z) * (0.5 / PI);
-    let v = acos_(direction.y.clamp(-1.0, 1.0)) * (1.0 / PI);
+    // Not the arc cosine of y: it loses half the digits near the poles.
+    let v = atan2_(safe_sqrt(x * x + z * z), direction.y) * (1.0 / PI);
     (u - u.floor(), v)
 }
 
@@ -117,7 +118,18 @@ struct Neighbours {
     c01: Vec3,
     c11: Vec3,
     fx: f32,
+    /// Share of the row's angle above the point.
     fy: f32,
+    /// Share of the row's solid angle above the point.
+    fy_solid_angle: f32,
+}
+
+/// Upper and lower edge of a row of cells, as v.
+fn row_edges(row: f32, height: f32) -> (f32, f32) {
+    (
+        ((row - 0.5) / height).max(0.0),
+        ((row + 0.5) / height).min(1.0),
+    )
 }
 
 fn env_neighbours(scene: &PackedScene, u: f32, v: f32) -> Neighbours {
@@ -137,13 +149,34 @@ fn env_neighbours(scene: &PackedScene, u: f32, v: f32) -> Neighbours {
         c11: env_texel(scene, i1, j1),
         fx: s - s0,
         fy: t - t0,
+        fy_solid_angle: row_solid_angle_above(t0 + 1.0, v, height as f32),
     }
 }
 
-fn env_interpolate(n: &Neighbours) -> Vec3 {
+/// (cos a - cos x) / (cos a - cos b) for the row's edges a and b, as products of sines: differences of cosines cancel near the poles.
+fn row_solid_angle_above(row: f32, v: f32, height: f32) -> f32 {
+    let (upper, lower) = row_edges(row, height);
+    let half_sin = |x: f32| sincos_2pi(0.25 * x).0;
+    let above = half_sin(upper + v) * half_sin(v - upper);
+    let whole = half_sin(upper + lower) * half_sin(lower - upper);
+    (above / whole.max(1e-30)).clamp(0.0, 1.0)
+}
+
+fn env_interpolate(n: &Neighbours, fy: f32) -> Vec3 {
     let top = n.c00 + (n.c10 - n.c00) * n.fx;
     let bottom = n.c01 + (n.c11 - n.c01) * n.fx;
-    top + (bottom - top) * n.fy
+    top + (bottom - top) * fy
+}
+
+/// Density of [`env_sample`] per solid angle, and the map's radiance.
+fn env_evaluate(scene: &PackedScene, direction: Vec3) -> (f32, Vec3) {
+    let (u, v) = env_coordinates(&scene.frame, direction);
+    let n = env_neighbours(scene, u, v);
+    let interpolated = luminance(env_interpolate(&n, n.fy_solid_angle)).max(0.0);
+    (
+        interpolated * scene.frame.env_radiance[3],
+        env_interpolate(&n, n.fy) * env_scale(&scene.frame),
+    )
 }
 
 fn env_scale(frame: &Frame) -> Vec3 {
@@ -160,7 +193,8 @@ pub fn env_radiance(scene: &PackedScene, direction: Vec3) -> Vec3 {
         return env_scale(&scene.frame);
     }
     let (u, v) = env_coordinates(&scene.frame, direction);
-    env_interpolate(&env_neighbours(scene, u, v)) * env_scale(&scene.frame)
+    let n = env_neighbours(scene, u, v);
+    env_interpolate(&n, n.fy) * env_scale(&scene.frame)
 }
 
 /// Density per solid angle with which [`env_sample`] draws `direction`.
@@ -168,13 +202,18 @@ pub fn env_direction_pdf(scene: &PackedScene, direction: Vec3) -> f32 {
     if scene.frame.env_width == 0 {
         return 0.25 / PI;
     }
-    let (u, v) = env_coordinates(&scene.frame, direction);
-    let n = env_neighbours(scene, u, v);
-    env_cell_luminance(&n) * scene.frame.env_radiance[3]
+    env_evaluate(scene, direction).0
 }
 
-fn env_cell_luminance(n: &Neighbours) -> f32 {
-    0.25 * (luminance(n.c00) + luminance(n.c10) + luminance(n.c01) + luminance(n.c11))
+/// Inverts the distribution whose density runs linearly from `a` to `b` over 0..1; uniform where both are 0.
+fn sample_linear(u: f32, a: f32, b: f32) -> f32 {
+    let sum = a + b;
+    if sum <= 0.0 {
+        return u;
+    }
+    let (first, last) = (a / sum, b / sum);
+    let root = safe_sqrt(first * first + u * (last - first));
+    (u / (first + root).max(1e-20)).min(1.0)
 }
 
 /// Last index i with cdf[base + i] <= u among `count` intervals.
@@ -212,13 +251,22 @@ pub fn env_sample(scene: &PackedScene, u0: f32, u1: f32) -> EnvSample {
         let (low, high) = (scene.env_cdf[at as usize], scene.env_cdf[at as usize + 1]);
         ((u - low) / (high - low).max(1e-20)).clamp(0.0, 1.0)
     };
-    let fy = within(row, u0);
-    let fx = within(base + column, u1);
-    let height = frame.env_height as f32;
-    let (_, cos_top) = sincos_2pi((0.5 * (row as f32 - 0.5) / height).max(0.0));
-    let (_, cos_bottom) = sincos_2pi((0.5 * (row as f32 + 0.5) / height).min(0.5));
-    let y = cos_top + (cos_bottom - cos_top) * fy;
-    let r = safe_sqrt(1.0 - y * y);
+    let (upper_u, left_u) = (within(row, u0), within(base + column, u1));
+    let corner = |i: u32, j: u32| luminance(env_texel(scene, i, j));
+    let next = (column + 1) % frame.env_width;
+    let (top, bottom) = (row.max(1) - 1, row.min(frame.env_height - 1));
+    let (l00, l10) = (corner(column, top), corner(next, top));
+    let (l01, l11) = (corner(column, bottom), corner(next, bottom));
+    let fy = sample_linear(upper_u, l00 + l10, l01 + l11);
+    let fx = sample_linear(left_u, l00 + (l01 - l00) * fy, l10 + (l11 - l10) * fy);
+    // Squared sine and cosine of half the angle from the zenith: each is precise at its own pole.
+    let (upper, lower) = row_edges(row as f32, frame.env_height as f32);
+    let (upper_sin, upper_cos) = sincos_2pi(0.25 * upper);
+    let (lower_sin, lower_cos) = sincos_2pi(0.25 * lower);
+    let sin2 = upper_sin * upper_sin * (1.0 - fy) + lower_sin * lower_sin * fy;
+    let cos2 = upper_cos * upper_cos * (1.0 - fy) + lower_cos * lower_cos * fy;
+    let y = cos2 - sin2;
+    let r = 2.0 * safe_sqrt(sin2 * cos2);
     let (sin, cos) = sincos_2pi((column as f32 + 0.5 + fx) / frame.env_width as f32 - 0.5);
     // Azimuth 0 is the map's centre column: -Z, with +X to its right.
     let (x, z) = (r * sin, -r * cos);
@@ -227,12 +275,11 @@ pub fn env_sample(scene: &PackedScene, u0: f32, u1: f32) -> EnvSample {
         y,
         z * frame.env_cos - x * frame.env_sin,
     );
-    // The cell is looked up from the direction, so that this density and env_direction_pdf's are the same number.
-    let (u, v) = env_coordinates(frame, direction);
-    let n = env_neighbours(scene, u, v);
+    // Looked up from the direction, so that this density and env_direction_pdf's are the same number.
+    let (pdf, radiance) = env_evaluate(scene, direction);
     EnvSample {
         direction,
-        radiance: env_interpolate(&n) * env_scale(frame),
-        pdf: env_cell_luminance(&n) * frame.env_radiance[3],
+        radiance,
+        pdf,
     }
 }

@@ -3,7 +3,9 @@
 use glam::Vec3;
 
 use super::environment::{env_direction_pdf, env_sample};
-use crate::math::{dot3, length3, safe_sqrt};
+use super::rectangle::{rectangle_from, sample_rectangle};
+use crate::material::triangle_emission;
+use crate::math::{cross3, dot3, length3, safe_sqrt};
 use crate::packed::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE,
     PackedScene,
@@ -40,21 +42,21 @@ fn xyz(v: [f32; 4]) -> Vec3 {
     Vec3::new(v[0], v[1], v[2])
 }
 
-/// Alias method over all lights.
-pub fn light_select(scene: &PackedScene, u: f32) -> u32 {
+/// Alias method over all lights; the coin has a number of its own because `u` has too few bits left once a light of many is chosen.
+pub fn light_select(scene: &PackedScene, u: f32, coin: f32) -> u32 {
     let scaled = u * scene.frame.light_count as f32;
     let index = (scaled as u32).min(scene.frame.light_count - 1);
     let light = &scene.lights[index as usize];
-    if scaled - index as f32 <= light.alias_threshold {
+    if coin < light.alias_threshold {
         index
     } else {
         light.alias
     }
 }
 
-/// Draws a light with u[0] and a point on it with u[1], u[2].
+/// Draws a light with u[0] and u[3] and a point on it with u[1], u[2]. There must be a light.
 pub fn light_sample(scene: &PackedScene, position: Vec3, u: [f32; 4]) -> LightSample {
-    let light = &scene.lights[light_select(scene, u[0]) as usize];
+    let light = &scene.lights[light_select(scene, u[0], u[3]) as usize];
     match light.kind {
         LIGHT_ENVIRONMENT => {
             let s = env_sample(scene, u[1], u[2]);
@@ -76,7 +78,7 @@ pub fn light_sample(scene: &PackedScene, position: Vec3, u: [f32; 4]) -> LightSa
             side: light.side,
         },
         LIGHT_POINT | LIGHT_SPOT => sample_point_light(light, position),
-        _ => sample_area_light(light, position, u[1], u[2]),
+        _ => sample_area_light(scene, light, position, u[1], u[2]),
     }
 }
 
@@ -109,39 +111,57 @@ fn spot_falloff(light: &Light, cos: f32) -> f32 {
     ramp * ramp
 }
 
-/// Uniform over the area; a quad emits to the side of axis_u x axis_v only, a triangle to both.
-fn sample_area_light(light: &Light, position: Vec3, u0: f32, u1: f32) -> LightSample {
+/// A rectangle uniformly by solid angle unless it is small, other quads and triangles uniformly by area. A quad emits to the side of
+/// axis_u x axis_v only, a triangle to both.
+fn sample_area_light(
+    scene: &PackedScene,
+    light: &Light,
+    position: Vec3,
+    u0: f32,
+    u1: f32,
+) -> LightSample {
+    let rectangle = rectangle_from(light, position);
     let (mut a, mut b) = (u0, u1);
     if light.kind != LIGHT_QUAD {
         let root = safe_sqrt(u0);
         a = root * (1.0 - u1);
         b = root * u1;
     }
-    let point = xyz(light.position) + xyz(light.axis_u) * a + xyz(light.axis_v) * b;
-    let to_light = point - position;
+    let mut to_light =
+        (xyz(light.position) - position) + (xyz(light.axis_u) * a + xyz(light.axis_v) * b);
+    if rectangle.solid_angle > 0.0 {
+        to_light = sample_rectangle(&rectangle, u0, u1);
+    }
     let distance = length3(to_light);
     if distance <= 0.0 {
         return no_light();
     }
     let direction = to_light / distance;
-    let pdf = area_pdf(light, direction, distance);
+    let mut pdf = area_pdf(light, direction, distance);
+    if rectangle.solid_angle > 0.0 {
+        pdf = light.select_pdf / rectangle.solid_angle;
+    }
     if pdf <= 0.0 {
         return no_light();
+    }
+    let mut radiance = xyz(light.radiance);
+    if light.triangle != NONE {
+        radiance = triangle_emission(scene, light.triangle, a, b);
     }
     LightSample {
         direction,
         distance,
-        radiance: xyz(light.radiance),
+        radiance,
         pdf,
         delta: false,
         side: light.side,
     }
 }
 
-/// Density per solid angle, choice included, of reaching an area light along `direction` at `distance`; 0 from a quad's dark side.
+/// Density per solid angle, choice included, of drawing uniformly by area what lies on an area light along `direction` at `distance`; 0 from a quad's dark side.
 fn area_pdf(light: &Light, direction: Vec3, distance: f32) -> f32 {
     let area = light.radiance[3];
-    let normal = xyz(light.axis_u).cross(xyz(light.axis_v));
+    let normal = cross3(xyz(light.axis_u), xyz(light.axis_v));
     let mut cos = -dot3(direction, normal) / length3(normal).max(1e-30);
     if light.kind != LIGHT_QUAD {
         cos = cos.abs();
@@ -152,12 +172,23 @@ fn area_pdf(light: &Light, direction: Vec3, distance: f32) -> f32 {
     light.select_pdf * distance * distance / (area * cos)
 }
 
-/// Density with which [`light_sample`] would have drawn the point that a ray along `direction` met at `distance` on `light`.
-pub fn light_pdf_hit(scene: &PackedScene, light: u32, direction: Vec3, distance: f32) -> f32 {
+/// Density with which [`light_sample`] at `from_position` would have drawn the point that a ray along `direction` met at `distance` on `light`.
+pub fn light_pdf_hit(
+    scene: &PackedScene,
+    light: u32,
+    from_position: Vec3,
+    direction: Vec3,
+    distance: f32,
+) -> f32 {
     if light == NONE {
         return 0.0;
     }
-    area_pdf(&scene.lights[light as usize], direction, distance)
+    let record = &scene.lights[light as usize];
+    let rectangle = rectangle_from(record, from_position);
+    if rectangle.solid_angle > 0.0 {
+        return record.select_pdf / rectangle.solid_angle;
+    }
+    area_pdf(record, direction, distance)
 }
 
 /// Density with which [`light_sample`] draws the environment in `direction`.

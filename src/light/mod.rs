@@ -3,3 +3,6 @@
 pub mod cones;
 pub mod environment;
 pub mod lights;
+mod rectangle;
+#[cfg(test)]
+mod tests;

@@ -8,6 +8,10 @@
 //!   vector is drawn from the visible normals, then reflection or refraction in proportion to what that facet does;
 //! - coat: GGX of index 1.5 that takes clearcoat * F(wo, n) and leaves the rest to what lies under it.
 //!
+//! Energy: metal, glass and Lambertian surfaces never send out more than they receive. An opaque dielectric can, as the specification's
+//! diffuse weight looks at the half vector only: smooth and white, index 1.5, it sends 1.02 at 60 degrees and 1.35 at 80, and 1.04 in
+//! the mean over all directions.
+//!
 //! A lobe whose alpha is under [`DELTA_ALPHA`] is a perfect mirror or lens: sampled with `delta` set, absent from [`bsdf_eval`].
 //! Radiance crosses an interface unscaled: what a path carries is radiance over index squared, so that light that enters and leaves
 //! glass needs no factor and a clear glass body in a furnace is invisible (Walter et al. 2007, section 2; Veach 1997, section 5.2).
@@ -357,7 +361,7 @@ fn delta_sample(wi: Vec3, weight: Vec3, transmitted: bool) -> BsdfSample {
 /// The whole mixture's weight for a direction that one of its non-delta lobes drew.
 fn mixture_sample(s: &Surface, lobes: &Lobes, wo: Vec3, wi: Vec3) -> BsdfSample {
     let eval = eval_with(s, lobes, wo, wi);
-    if !(eval.pdf > 0.0) {
+    if eval.pdf <= 0.0 {
         return SAMPLE_NOTHING;
     }
     BsdfSample {
@@ -394,7 +398,7 @@ pub fn bsdf_sample(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
     }
     let wi = sample_lambert(s, u[1], u[2]);
     let pdf = lambert_cos(s, wi) * INV_PI;
-    if !(pdf > 0.0) {
+    if pdf <= 0.0 {
         return SAMPLE_NOTHING;
     }
     BsdfSample {
@@ -409,7 +413,7 @@ pub fn bsdf_sample(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
 
 fn sample_layers(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
     let lobes = lobes_at(s, wo);
-    if !(lobes.sum > NO_ALBEDO) {
+    if lobes.sum <= NO_ALBEDO {
         return SAMPLE_NOTHING;
     }
     if u[0] < lobes.p_diffuse {
@@ -528,13 +532,18 @@ pub fn bsdf_albedo(s: &Surface, wo: Vec3) -> Vec3 {
     (under * (1.0 - lobes.coat) + Vec3::splat(lobes.coat)).min(Vec3::ONE)
 }
 
-/// Bound on the share of light that any channel sends in any direction.
+/// Bound on the share of light that any channel sends in any direction. It may exceed 1: see the module's note on energy.
 pub fn bsdf_directional_albedo_bound(s: &Surface) -> f32 {
     if scatters_nothing(s) {
-        0.0
-    } else if bsdf_is_lambertian(s) {
-        max3(s.base_color)
+        return 0.0;
+    }
+    if bsdf_is_lambertian(s) {
+        return max3(s.base_color);
+    }
+    let under = max3(diffuse_color(s)) + grazing_albedo(s);
+    if s.clearcoat > 0.0 {
+        under.max(1.0)
     } else {
-        1.0
+        under
     }
 }

@@ -16,5 +16,5 @@ pub use bsdf::{
     BsdfEval, BsdfSample, bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_is_delta,
     bsdf_is_lambertian, bsdf_sample,
 };
-pub use surface::{Surface, surface_alpha, surface_at};
+pub use surface::{Surface, surface_alpha, surface_at, triangle_emission};
 pub use texture::{srgb_decode, texture_sample};

@@ -21,7 +21,7 @@ pub fn triangle_normal(e1: Vec3, e2: Vec3, fallback: Vec3) -> Vec3 {
     let a2 = e2.abs();
     let m1 = a1.x.max(a1.y).max(a1.z);
     let m2 = a2.x.max(a2.y).max(a2.z);
-    if !(m1 > 1e-36 && m2 > 1e-36) {
+    if m1 <= 1e-36 || m2 <= 1e-36 {
         return fallback;
     }
     // Scaled first: the square of a millimetre triangle's cross product would underflow.
@@ -41,7 +41,7 @@ pub fn tangent_from_uv(e1: Vec3, e2: Vec3, d1: Vec2, d2: Vec2, normal: Vec3) -> 
     let along_u = (e1 * d2.y - e2 * d1.y) * det;
     let along_v = (e2 * d1.x - e1 * d2.x) * det;
     // Only directions count, so the determinant enters by its sign and size cancels in the normalisation.
-    if !(along_u.dot(along_u) > 0.0) {
+    if along_u.dot(along_u) <= 0.0 {
         return Vec4::ZERO;
     }
     let handedness = if cross3(normal, along_u).dot(along_v) > 0.0 {
@@ -60,7 +60,7 @@ pub fn mapped_normal(normal: Vec3, tangent: Vec4, sample: Vec3, scale: f32) -> V
     }
     let t_raw = tangent.truncate();
     let t_flat = t_raw - normal * normal.dot(t_raw);
-    if !(t_flat.dot(t_flat) > 1e-12) {
+    if t_flat.dot(t_flat) <= 1e-12 {
         return normal;
     }
     let t = unit(t_flat);
@@ -83,7 +83,7 @@ pub fn mapped_normal(normal: Vec3, tangent: Vec4, sample: Vec3, scale: f32) -> V
 /// r cos(2 phi - psi); it is solved for phi by half-angle formulas that hold at grazing angles.
 pub fn valid_shading_normal(ng: Vec3, ns: Vec3, wo: Vec3) -> Vec3 {
     let wo_z = wo.dot(ng);
-    if !(wo_z > 0.0) {
+    if wo_z <= 0.0 {
         return ng;
     }
     let threshold = (0.9 * wo_z).min(0.01);
@@ -93,7 +93,7 @@ pub fn valid_shading_normal(ng: Vec3, ns: Vec3, wo: Vec3) -> Vec3 {
         return ns;
     }
     let across = ns - ng * ns.dot(ng);
-    if !(across.dot(across) > 1e-12) {
+    if across.dot(across) <= 1e-12 {
         return ng;
     }
     let x = unit(across);
@@ -103,7 +103,7 @@ pub fn valid_shading_normal(ng: Vec3, ns: Vec3, wo: Vec3) -> Vec3 {
     let sin_2phi = (wo_x * threshold + wo_z * rest) / r2;
     let cos_2phi = (wo_z * threshold - wo_x * rest) / r2;
     let corrected = x * sin_2phi.max(0.0) + ng * (1.0 + cos_2phi);
-    if !(corrected.dot(corrected) > 1e-6) {
+    if corrected.dot(corrected) <= 1e-6 {
         return ng;
     }
     let n = unit(corrected);

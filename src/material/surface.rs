@@ -127,13 +127,34 @@ pub fn surface_alpha(scene: &PackedScene, hit: Hit) -> f32 {
     coverage_of(material, alpha)
 }
 
+/// Radiance times opacity of an emissive triangle at barycentrics (u, v), without the rest of the shading point: what light sampling asks.
+pub fn triangle_emission(scene: &PackedScene, triangle: u32, u: f32, v: f32) -> Vec3 {
+    let record = &scene.triangles[triangle as usize];
+    let material = &scene.materials[record.material as usize];
+    let mut emission = Vec3::from(material.emissive);
+    if material.emissive_texture != NONE {
+        let [v0, v1, v2] = corners(scene, record);
+        let b = Vec3::new(1.0 - u - v, u, v);
+        let uv0 = blend2(b, vertex_uv0(v0), vertex_uv0(v1), vertex_uv0(v2));
+        let uv1 = blend2(b, vertex_uv1(v0), vertex_uv1(v1), vertex_uv1(v2));
+        emission *= slot_rgb(scene, material.emissive_texture, uv0, uv1);
+    }
+    let hit = Hit {
+        t: 0.0,
+        u,
+        v,
+        triangle,
+    };
+    emission * surface_alpha(scene, hit)
+}
+
 /// Albedo that the photograph's pixel over `position` was found to have: the median where the camera does not see the point.
 fn photo_albedo_at(scene: &PackedScene, position: Vec3) -> Vec3 {
     let frame = &scene.frame;
     let median = Vec4::from(frame.photo_albedo_median).truncate();
     let offset = position - Vec4::from(frame.camera_position).truncate();
     let depth = -offset.dot(Vec4::from(frame.camera_back).truncate());
-    if !(depth > 0.0) {
+    if depth <= 0.0 {
         return median;
     }
     // OpenCV axes: y down. The lens distortion maps ideal to photograph coordinates.

@@ -191,7 +191,10 @@ impl PackedScene {
                 self.add_instance(&object.world_from_object, instance, material, index as u32);
             }
         }
-        for light in scene.lights.iter().filter(|l| l.side == side) {
+        for (index, light) in scene.lights.iter().enumerate() {
+            if light.side != side {
+                continue;
+            }
             if let LightKind::Quad {
                 corner,
                 edge_u,
@@ -206,6 +209,7 @@ impl PackedScene {
                     DVec3::from(edge_u),
                     DVec3::from(edge_v),
                     material,
+                    index as u32,
                 );
             }
         }
@@ -272,11 +276,12 @@ impl PackedScene {
         }
         for &[a, b, c] in &primitive.triangles {
             let (b, c) = if mirrored { (c, b) } else { (b, c) };
-            self.add_triangle([a, b, c].map(|i| first_vertex + i), material, object);
+            let vertices = [a, b, c].map(|i| first_vertex + i);
+            self.add_triangle(vertices, material, object, NONE);
         }
     }
 
-    fn add_quad(&mut self, corner: DVec3, edge_u: DVec3, edge_v: DVec3, material: u32) {
+    fn add_quad(&mut self, corner: DVec3, edge_u: DVec3, edge_v: DVec3, material: u32, light: u32) {
         let first_vertex = self.vertices.len() as u32;
         let normal = edge_u.cross(edge_v).normalize_or_zero().as_vec3();
         let anchor = DVec3::from(self.anchor_m);
@@ -291,12 +296,13 @@ impl PackedScene {
             });
         }
         for corners in [[0, 1, 2], [0, 2, 3]] {
-            self.add_triangle(corners.map(|i| first_vertex + i), material, NONE);
+            let vertices = corners.map(|i| first_vertex + i);
+            self.add_triangle(vertices, material, NONE, light);
         }
     }
 
     /// Triangles that the transform or the rounding made degenerate are left out.
-    fn add_triangle(&mut self, vertices: [u32; 3], material: u32, object: u32) {
+    fn add_triangle(&mut self, vertices: [u32; 3], material: u32, object: u32, light: u32) {
         let [a, b, c] = vertices.map(|v| self.position(v));
         if (b - a)
             .as_dvec3()
@@ -307,7 +313,7 @@ impl PackedScene {
             self.triangles.push(Triangle {
                 vertices,
                 material,
-                light: NONE,
+                light,
                 object,
                 pad: [0; 2],
             });

@@ -23,22 +23,20 @@ const EMISSION_POINTS: [[f32; 2]; 7] = [
 
 /// Fills `packed.lights`, the triangles' light indices and the frame's light fields.
 pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
+    // The scene's lights come first, in their order: a quad's triangles already name theirs.
     for triangle in &mut packed.triangles {
-        triangle.light = NONE;
+        let flags = packed.materials[triangle.material as usize].flags;
+        if flags & MATERIAL_QUAD_LIGHT == 0 {
+            triangle.light = NONE;
+        }
     }
     let mut lights = Vec::new();
     let mut powers = Vec::new();
     let radius = scene_radius(packed);
     let anchor = DVec3::from(packed.anchor_m);
-    let mut quads = [quad_triangles(packed, 0), quad_triangles(packed, 1)];
     for light in &scene.lights {
         let side = u32::from(light.side == Side::Virtual);
         let (record, power) = pack_light(&light.kind, side, anchor, radius);
-        if record.kind == LIGHT_QUAD {
-            for triangle in quads[side as usize].drain(..2) {
-                packed.triangles[triangle].light = lights.len() as u32;
-            }
-        }
         lights.push(record);
         powers.push(power);
     }
@@ -52,21 +50,6 @@ pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
     set_probabilities(&mut lights, &powers);
     packed.frame.light_count = lights.len() as u32;
     packed.lights = lights;
-}
-
-/// Triangles of the quad lights of one side, two a quad, in the order of the scene's lights.
-fn quad_triangles(packed: &PackedScene, side: u32) -> Vec<usize> {
-    let real = packed.frame.real_triangle_count as usize;
-    let range = if side == 0 {
-        0..real
-    } else {
-        real..packed.triangles.len()
-    };
-    range
-        .filter(|&i| {
-            packed.materials[packed.triangles[i].material as usize].flags & MATERIAL_QUAD_LIGHT != 0
-        })
-        .collect()
 }
 
 /// Radius about the anchor that holds three quarters of the vertices: outliers must not make the environment seem all-important.
@@ -234,17 +217,33 @@ fn mean_emission(packed: &PackedScene, triangle: usize) -> Vec3 {
     factor * sum / EMISSION_POINTS.len() as f32
 }
 
-/// Half the choice is uniform, half follows the power estimates; alias table after Vose.
+/// Share of the choice that follows the power estimates; the rest is uniform over the lights, all emissive triangles together counting as
+/// one, so that no light is left out and a finely meshed one does not draw all the rays.
+const POWER_SHARE: f64 = 0.8;
+
+/// Probabilities of choosing each light, and their alias table after Vose.
 fn set_probabilities(lights: &mut [Light], powers: &[f64]) {
     let n = lights.len() as f64;
     let total: f64 = powers.iter().sum();
-    let mut scaled: Vec<f64> = powers
+    let is_triangle = |l: &Light| l.kind == LIGHT_TRIANGLE;
+    let triangles = lights.iter().zip(powers).filter(|(l, _)| is_triangle(l));
+    let triangle_power: f64 = triangles.map(|(_, p)| p).sum();
+    let count =
+        lights.iter().filter(|l| !is_triangle(l)).count() as f64 + f64::from(triangle_power > 0.0);
+    let mut scaled: Vec<f64> = lights
         .iter()
-        .map(|p| {
-            if total > 0.0 {
-                0.5 + 0.5 * n * p / total
+        .zip(powers)
+        .map(|(light, power)| {
+            let unit = if is_triangle(light) {
+                power / triangle_power
             } else {
                 1.0
+            };
+            let uniform = n * unit / count;
+            if total > 0.0 {
+                (1.0 - POWER_SHARE) * uniform + POWER_SHARE * n * power / total
+            } else {
+                uniform
             }
         })
         .collect();

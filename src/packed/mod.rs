@@ -7,9 +7,15 @@ mod build;
 mod lights;
 mod materials;
 mod records;
+#[cfg(test)]
+mod test_support;
+#[cfg(test)]
+mod tests;
 
 pub use build::PackError;
 pub use records::*;
+#[cfg(test)]
+pub use test_support::{test_mesh, test_scene};
 
 use crate::accel::WorldBvh;
 

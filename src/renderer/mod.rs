@@ -21,15 +21,19 @@ mod control;
 mod photo_albedo;
 mod stats;
 
+use std::sync::Arc;
 use std::time::Instant;
+
+use glam::DMat4;
 
 pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
 pub use stats::Stats;
 
 use crate::cpu;
 use crate::film::{Film, Picture, Planes, composite, planes};
+use crate::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError};
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
-use crate::scene::{Composite, Exposure, Scene};
+use crate::scene::{BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Side};
 
 /// The longest a pass runs before the film is shown, in rays per pixel.
 const MAX_PASS_SAMPLES: u32 = 8;
@@ -45,6 +49,8 @@ pub struct RendererOptions {
 pub enum RenderError {
     #[error(transparent)]
     Pack(#[from] crate::packed::PackError),
+    #[error(transparent)]
+    Gpu(#[from] crate::gpu::GpuError),
     #[error("there is no object number {0} in the scene")]
     NoSuchObject(usize),
 }
@@ -73,6 +79,7 @@ pub struct Renderer {
 
 enum Backend {
     Cpu,
+    Gpu(Box<GpuBackend>),
 }
 
 impl Renderer {
@@ -99,13 +106,38 @@ impl Renderer {
             seconds: Seconds::default(),
             notes: Vec::new(),
         };
-        renderer.prepare();
+        renderer.prepare_photo();
+        renderer.packed.pixels = cpu::pilot(&renderer.packed);
         renderer.seconds.build = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        renderer.backend = renderer.open_backend()?;
+        renderer.seconds.compile = start.elapsed().as_secs_f64();
         Ok(renderer)
     }
 
-    /// What follows from the packed scene: exposure, albedo from the photograph, the pilot.
-    fn prepare(&mut self) {
+    fn open_backend(&mut self) -> Result<Backend, RenderError> {
+        let choice = match self.scene.settings.backend {
+            BackendChoice::Cpu => return Ok(Backend::Cpu),
+            BackendChoice::Gpu => AdapterChoice::Any,
+            BackendChoice::Auto => AdapterChoice::Hardware,
+        };
+        let opened =
+            GpuDevice::open(choice).and_then(|gpu| GpuBackend::new(Arc::new(gpu), &self.packed));
+        match opened {
+            Ok(gpu) => Ok(Backend::Gpu(Box::new(gpu))),
+            Err(error) if self.scene.settings.backend == BackendChoice::Auto => {
+                if !matches!(error, GpuError::NoAdapter(_)) {
+                    self.notes
+                        .push(format!("the CPU renders, for the GPU cannot: {error}"));
+                }
+                Ok(Backend::Cpu)
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// What follows from the real world and its light: exposure, and albedo from the photograph.
+    fn prepare_photo(&mut self) {
         if self.options.all_planes {
             self.packed.frame.flags |= FRAME_AOVS;
         }
@@ -133,7 +165,6 @@ impl Renderer {
                 photo_albedo::estimate_photo_albedo(&mut self.packed, photo);
             }
         }
-        self.packed.pixels = cpu::pilot(&self.packed);
     }
 
     /// True if no pixel is within reach of anything virtual: the picture is the photograph.
@@ -193,7 +224,107 @@ impl Renderer {
         Ok(())
     }
 
+    /// Another lens. Nothing is rebuilt but the pilot; the film starts anew.
+    ///
+    /// # Errors
+    /// The new scene does not fit the adapter.
+    pub fn set_lens(&mut self, lens: Lens) -> Result<(), RenderError> {
+        self.scene.lens = lens;
+        self.packed.set_camera(&self.scene);
+        self.restart(false)
+    }
+
+    /// Another camera pose. While it stays near the anchor nothing is rebuilt but the pilot.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn set_camera_pose(&mut self, world_from_camera: DMat4) -> Result<(), RenderError> {
+        self.scene.camera.world_from_camera = world_from_camera;
+        if self.packed.anchor_serves(&self.scene) {
+            self.packed.set_camera(&self.scene);
+        } else {
+            self.packed = PackedScene::build(&self.scene)?;
+        }
+        self.restart(true)
+    }
+
+    /// Moves an object of the scene. A virtual one costs the virtual BVH, a real one everything.
+    ///
+    /// # Errors
+    /// There is no such object, or as [`Renderer::new`].
+    pub fn set_object_transform(
+        &mut self,
+        object: usize,
+        world_from_object: DMat4,
+    ) -> Result<(), RenderError> {
+        let entry = self
+            .scene
+            .objects
+            .get_mut(object)
+            .ok_or(RenderError::NoSuchObject(object))?;
+        entry.world_from_object = world_from_object;
+        let real = entry.side == Side::Real;
+        match entry.side {
+            Side::Virtual => self.packed.rebuild_virtual(&self.scene)?,
+            Side::Real => self.packed = PackedScene::build(&self.scene)?,
+        }
+        self.restart(real)
+    }
+
+    /// Other lights. Real quads are part of the real world, so where they change it is built anew.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn set_lights(&mut self, lights: Vec<Light>) -> Result<(), RenderError> {
+        let real_quads = |lights: &[Light]| -> Vec<Light> {
+            lights
+                .iter()
+                .filter(|l| l.side == Side::Real && matches!(l.kind, LightKind::Quad { .. }))
+                .cloned()
+                .collect()
+        };
+        let real_world_changes = real_quads(&self.scene.lights) != real_quads(&lights);
+        self.scene.lights = lights;
+        if real_world_changes {
+            self.packed = PackedScene::build(&self.scene)?;
+        } else {
+            self.packed.rebuild_virtual(&self.scene)?;
+        }
+        self.restart(true)
+    }
+
+    /// Takes up the packed scene after an edit.
+    fn restart(&mut self, real_light_changed: bool) -> Result<(), RenderError> {
+        let start = Instant::now();
+        if real_light_changed {
+            self.prepare_photo();
+        }
+        self.packed.pixels = cpu::pilot(&self.packed);
+        self.film = Film::new(
+            self.film.width,
+            self.film.height,
+            self.film.first_sample,
+            self.options.all_planes,
+        );
+        if let Backend::Gpu(gpu) = &mut self.backend {
+            gpu.set_scene(&self.packed)?;
+        }
+        self.seconds.build += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
     fn run_pass(&mut self, pass: Pass, cancel: &Cancel) -> Result<(), RenderError> {
+        if let Backend::Gpu(gpu) = &mut self.backend {
+            match gpu.render_pass(&self.packed, &mut self.film, pass, cancel, &mut self.rays) {
+                Err(error @ GpuError::Lost(_)) => {
+                    self.notes.push(format!(
+                        "{error}; the CPU goes on from what was accumulated"
+                    ));
+                    self.backend = Backend::Cpu;
+                }
+                other => return Ok(other?),
+            }
+        }
         self.rays += cpu::render::render_pass(&self.packed, &mut self.film, pass, cancel);
         Ok(())
     }
@@ -254,6 +385,7 @@ impl Renderer {
     pub fn backend_name(&self) -> &'static str {
         match self.backend {
             Backend::Cpu => "cpu",
+            Backend::Gpu(_) => "gpu",
         }
     }
 
@@ -261,6 +393,7 @@ impl Renderer {
     pub fn device_name(&self) -> String {
         match &self.backend {
             Backend::Cpu => format!("{} CPU threads", rayon::current_num_threads()),
+            Backend::Gpu(gpu) => gpu.device_name(),
         }
     }
 }

@@ -65,8 +65,9 @@ pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo) {
 /// log2 of the factor that fits the real radiance to the photograph over the proxy: the median of Ic / Ir in luminance.
 pub fn fit_exposure_ev(scene: &mut PackedScene, photo: &Photo) -> Option<f64> {
     let seen = first_surfaces(scene, |_| true);
-    let first = [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, 0.0];
-    scene.frame.photo_albedo_median = first;
+    // Nothing is known of the albedo yet: every point takes the median.
+    scene.photo_albedo = vec![[0.0; 4]; seen.len()];
+    scene.frame.photo_albedo_median = [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, 0.0];
     let grid = trace_grid(scene, &seen);
     let width = scene.frame.width as usize;
     let mut ratios: Vec<f64> = grid

@@ -131,7 +131,7 @@ pub enum EnvironmentMap {
     },
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Light {
     pub kind: LightKind,
     pub side: Side,

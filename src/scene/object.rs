@@ -100,8 +100,10 @@ impl<'w> ObjectReader<'w> {
         check_extent(&table, &object)?;
         let may_detect = side == Side::Real && shape.is_none();
         let note = settle_scan(&table, &mut object, may_detect)?;
+        // A scanner writes the same grey for everything: that is no measured material.
+        let measured = parts.has_materials && !(note.is_some() && is_placeholder(&object));
         self.warnings.extend(note);
-        self.settle_materials(&table, &mut object, parts.has_materials, shape.is_some())?;
+        self.settle_materials(&table, &mut object, measured, shape.is_some())?;
         Ok(object)
     }
 
@@ -219,6 +221,19 @@ fn read_shape(shape: Shape, table: &Table) -> Result<Parts> {
         }],
         lights: Vec::new(),
         has_materials: false,
+    })
+}
+
+/// Every part has one grey without textures.
+fn is_placeholder(object: &Object) -> bool {
+    object.instances.iter().all(|instance| {
+        let m = &*instance.material;
+        let [r, g, b, _] = m.base_color;
+        r == g
+            && g == b
+            && m.metallic == 0.0
+            && m.base_color_texture.is_none()
+            && instance.primitive.colors.is_empty()
     })
 }
 

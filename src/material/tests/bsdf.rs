@@ -126,6 +126,8 @@ struct Bins {
 }
 
 const AZIMUTHS: usize = 16;
+/// Most times that a bin is halved in both directions for its quadrature.
+const SPLITS: u32 = 6;
 
 impl Bins {
     /// Over the whole sphere; the horizon of `axis` is an edge.
@@ -182,7 +184,7 @@ impl Bins {
             for azimuth in 0..AZIMUTHS {
                 let width = TAU / AZIMUTHS as f64;
                 let phi = [azimuth as f64 * width, (azimuth + 1) as f64 * width];
-                sums.push(settled_integral(&at, h, phi, 3e-6, 6));
+                sums.push(settled_integral(&at, h, phi, 3e-6, SPLITS));
             }
         }
         sums
@@ -209,9 +211,12 @@ fn settled_integral(
         }
         sum / f64::from(n * n)
     };
-    let (coarse, fine) = (mean(3), mean(4));
-    if splits == 0 || (fine - coarse).abs() * solid_angle <= tolerance {
-        return fine * solid_angle;
+    // Two splits at least: a density that ends along a ring near a cell's border escapes the comparison of a single cell.
+    if splits + 2 <= SPLITS {
+        let (coarse, fine) = (mean(2), mean(3));
+        if splits == 0 || (fine - coarse).abs() * solid_angle <= tolerance {
+            return fine * solid_angle;
+        }
     }
     let (hm, pm) = (0.5 * (h[0] + h[1]), 0.5 * (phi[0] + phi[1]));
     [[h[0], hm], [hm, h[1]]]
@@ -417,7 +422,7 @@ fn nothing_is_ever_non_finite() {
         let wo = around(
             s.ng,
             FRAC_PI_2 - 10f64.powf(f64::from(random.range(-7.0, 0.19))),
-            f64::from(random.range(0.0, 6.28)),
+            f64::from(random.range(0.0, 6.2)),
         );
         if wo.dot(s.ng) <= 0.0 {
             continue;
@@ -507,7 +512,7 @@ fn white_bodies_vanish_in_a_furnace() {
         let wo = around(
             lambertian().ng,
             f64::from(random.range(0.0, 1.57)),
-            f64::from(random.range(0.0, 6.28)),
+            f64::from(random.range(0.0, 6.2)),
         );
         let u = random.triple();
         for s in [
@@ -627,20 +632,30 @@ fn directional_albedos_are_the_specifications() {
 
 #[test]
 fn no_energy_is_made_by_glass_metal_or_coat() {
-    for (name, s) in surfaces() {
-        if s.transmission < 1.0 && s.metallic < 1.0 && name != "lambertian" {
-            continue;
-        }
+    let mut largest: f64 = 0.0;
+    for (name, s) in surfaces().into_iter().chain([(
+        "white",
+        Surface {
+            ggx_alpha: 0.0,
+            ..plain_surface()
+        },
+    )]) {
+        let conserves = s.transmission == 1.0 || s.metallic == 1.0 || name == "lambertian";
         for theta in [0.1, 1.0, 1.4, 1.55, FRAC_PI_2 - 1e-4] {
             let wo = wo_at(&s, theta);
-            let (mean, error) = albedo(&s, wo, 20_000, 3);
+            let (mean, error) = albedo(&seen_from(&s, wo), wo, 20_000, 3);
+            let slack = 1e-5 + 4.0 * error;
             assert!(
-                mean <= 1.0 + 1e-5 + 4.0 * error,
+                !conserves || mean <= 1.0 + slack,
                 "{name} at {theta}: {mean}"
             );
-            assert!(mean <= f64::from(bsdf_directional_albedo_bound(&s)) + 1e-5 + 4.0 * error);
+            let bound = f64::from(bsdf_directional_albedo_bound(&s));
+            assert!(mean <= bound + slack, "{name} at {theta}: {mean} {bound}");
+            largest = largest.max(mean);
         }
     }
+    // Negative control: a smooth white dielectric does exceed 1 at grazing angles, as glTF defines it.
+    assert!(largest > 1.5, "{largest}");
 }
 
 #[test]

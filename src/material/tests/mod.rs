@@ -96,18 +96,17 @@ pub fn one_triangle(corners: [[f32; 3]; 3], material: Material) -> PackedScene {
             uv1: [u, v, 0.0, 0.0],
         })
         .collect();
-    PackedScene {
-        triangles: vec![Triangle {
-            vertices: [0, 1, 2],
-            material: 0,
-            light: NONE,
-            object: 7,
-            pad: [0; 2],
-        }],
-        vertices,
-        materials: vec![material],
-        ..PackedScene::empty()
-    }
+    let mut scene = PackedScene::empty();
+    scene.triangles = vec![Triangle {
+        vertices: [0, 1, 2],
+        material: 0,
+        light: NONE,
+        object: 7,
+        pad: [0; 2],
+    }];
+    scene.vertices = vertices;
+    scene.materials = vec![material];
+    scene
 }
 
 /// A surface under test with its normal askew to the axes: white, fully rough dielectric, front.

@@ -143,12 +143,12 @@ fn mirror_directions_leave_the_surface() {
         let wo = around(
             ng,
             std::f64::consts::FRAC_PI_2 - grazing,
-            f64::from(random.range(0.0, 6.28)),
+            f64::from(random.range(0.0, 6.2)),
         );
         let ns = around(
             ng,
             f64::from(random.range(0.0, if i % 2 == 0 { 0.1 } else { 1.8 })),
-            f64::from(random.range(0.0, 6.28)),
+            f64::from(random.range(0.0, 6.2)),
         );
         if wo.dot(ng) <= 0.0 {
             continue;

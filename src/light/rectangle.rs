@@ -1,0 +1,94 @@
+//! Rectangular lights by solid angle, after Ureña, Fajardo and King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013,
+//! in a form without their differences of nearly equal angles. WGSL twin: `shaders/rectangle.wgsl`.
+
+use glam::Vec3;
+
+use crate::math::{atan2_, cross3, dot3, length3, safe_sqrt, sincos_2pi};
+use crate::packed::{LIGHT_QUAD, Light};
+
+/// Smaller solid angles (sr) are sampled by area: the angle is a sum of four terms and would lose its precision.
+const MIN_SOLID_ANGLE: f32 = 0.02;
+/// Largest cosine between the edges of a quad that counts as a rectangle.
+const RIGHT_ANGLE: f32 = 1e-5;
+const INV_TAU: f32 = 0.159_154_94;
+
+/// A rectangle seen from a point, in axes along its edges.
+pub struct Rectangle {
+    ex: Vec3,
+    ey: Vec3,
+    /// Normal on the emitting side.
+    ez: Vec3,
+    x0: f32,
+    x1: f32,
+    y0: f32,
+    y1: f32,
+    /// Of the point above the rectangle's plane, on the emitting side.
+    height: f32,
+    /// Steradians; 0 where it is not to be sampled by solid angle.
+    pub solid_angle: f32,
+}
+
+/// The quad `light` from `position`; `solid_angle` 0 for other lights, oblique quads, the dark side and small solid angles.
+pub fn rectangle_from(light: &Light, position: Vec3) -> Rectangle {
+    let [ux, uy, uz, _] = light.axis_u;
+    let [vx, vy, vz, _] = light.axis_v;
+    let (axis_u, axis_v) = (Vec3::new(ux, uy, uz), Vec3::new(vx, vy, vz));
+    let width = length3(axis_u);
+    let depth = length3(axis_v);
+    let ex = axis_u / width;
+    let ey = axis_v / depth;
+    let ez = cross3(ex, ey);
+    let corner = Vec3::new(light.position[0], light.position[1], light.position[2]) - position;
+    let x0 = dot3(corner, ex);
+    let y0 = dot3(corner, ey);
+    let mut r = Rectangle {
+        ex,
+        ey,
+        ez,
+        x0,
+        x1: x0 + width,
+        y0,
+        y1: y0 + depth,
+        height: -dot3(corner, ez),
+        solid_angle: 0.0,
+    };
+    if light.kind != LIGHT_QUAD || dot3(ex, ey).abs() > RIGHT_ANGLE || r.height <= 0.0 {
+        return r;
+    }
+    let right = corner_angle(r.x1, r.y1, r.height) - corner_angle(r.x1, r.y0, r.height);
+    let left = corner_angle(r.x0, r.y1, r.height) - corner_angle(r.x0, r.y0, r.height);
+    let solid_angle = right - left;
+    if solid_angle >= MIN_SOLID_ANGLE {
+        r.solid_angle = solid_angle;
+    }
+    r
+}
+
+/// Signed solid angle of the rectangle from the foot of the perpendicular to (x, y).
+fn corner_angle(x: f32, y: f32, height: f32) -> f32 {
+    atan2_(x * y, height * safe_sqrt(x * x + y * y + height * height))
+}
+
+/// Vector from the point to a place on the rectangle, uniform by solid angle.
+pub fn sample_rectangle(r: &Rectangle, u0: f32, u1: f32) -> Vec3 {
+    let height_squared = r.height * r.height;
+    // The strip from x0 to x has the solid angle asin(c p) + asin(c q) - start, c being the sine of x's azimuth about the y axis.
+    let p = r.y1 / safe_sqrt(r.y1 * r.y1 + height_squared);
+    let q = -r.y0 / safe_sqrt(r.y0 * r.y0 + height_squared);
+    let start = corner_angle(r.x0, r.y1, r.height) - corner_angle(r.x0, r.y0, r.height);
+    let (half_sin, half_cos) = sincos_2pi((start + u0 * r.solid_angle) * (0.5 * INV_TAU));
+    // p^2 + q^2 + 2 p q cos of that angle, as whichever sum has no cancellation
+    let mut squared = (p + q) * (p + q) - 4.0 * p * q * half_sin * half_sin;
+    if p * q > 0.0 {
+        squared = (p - q) * (p - q) + 4.0 * p * q * half_cos * half_cos;
+    }
+    let c = (2.0 * half_sin * half_cos / safe_sqrt(squared.max(1e-20))).clamp(-1.0, 1.0);
+    let x = (c * r.height / safe_sqrt((1.0 - c * c).max(1e-12))).clamp(r.x0, r.x1);
+    // Along the strip the solid angle is proportional to the sine of the elevation.
+    let strip_squared = x * x + height_squared;
+    let low = r.y0 / safe_sqrt(strip_squared + r.y0 * r.y0);
+    let high = r.y1 / safe_sqrt(strip_squared + r.y1 * r.y1);
+    let s = low + (high - low) * u1;
+    let y = (s * safe_sqrt(strip_squared) / safe_sqrt((1.0 - s * s).max(1e-12))).clamp(r.y0, r.y1);
+    (r.ex * x + r.ey * y) - r.ez * r.height
+}
