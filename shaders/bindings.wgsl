@@ -35,6 +35,10 @@ struct Frame {
     exposure_scale: f32,
     virtual_node_base: u32,
     virtual_leaf_base: u32,
+    clamp_indirect: f32,
+    pad_0: f32,
+    pad_1: f32,
+    pad_2: f32,
     photo_albedo_median: vec4<f32>,
     spheres: array<vec4<f32>, 16>,
 }

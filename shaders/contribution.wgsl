@@ -29,7 +29,12 @@ fn sample_key(st: ptr<function, PathState>) -> SampleKey {
     return SampleKey((*st).pixel, (*st).index, frame.rays_total, frame.seed, frame.sampler);
 }
 
-fn accumulate(st: ptr<function, PathState>, light: vec3<f32>) {
+fn accumulate(st: ptr<function, PathState>, unclamped: vec3<f32>) {
+    var light = unclamped;
+    if (*st).indirect != 0u {
+        let largest = max(max(abs(light.x), abs(light.y)), abs(light.z));
+        if largest > frame.clamp_indirect { light *= frame.clamp_indirect / largest; }
+    }
     @if(paper) {
         if (*st).mode != MODE_REAL { (*st).radiance += light; }
         if (*st).mode == MODE_REAL || (*st).mode == MODE_SHARED { (*st).radiance_real += light; }

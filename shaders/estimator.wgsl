@@ -152,6 +152,7 @@ fn resume(st: ptr<function, PathState>) {
             (*st).direction = (*st).next_direction;
             (*st).density = (*st).next_density;
             (*st).throughput = (*st).next_throughput;
+            if (*st).density != DELTA_DENSITY { (*st).indirect = 1u; }
             (*st).t_max = FAR;
             if (*st).mode == MODE_DIFFERENCE {
                 (*st).stage = STAGE_DIFFERENCE_CONE;
@@ -170,6 +171,7 @@ fn resume(st: ptr<function, PathState>) {
             (*st).direction = (*st).real_direction;
             (*st).density = (*st).real_density;
             (*st).throughput = (*st).real_throughput;
+            if (*st).density != DELTA_DENSITY { (*st).indirect = 1u; }
             plan_vertex(st, (*st).real_hit);
             continue;
         }
@@ -184,6 +186,7 @@ fn resume(st: ptr<function, PathState>) {
             (*st).direction = (*st).difference_direction;
             (*st).density = (*st).difference_density;
             (*st).throughput = (*st).difference_throughput;
+            (*st).indirect = 1u;
             (*st).depth = (*st).difference_depth;
             (*st).t_max = FAR;
             (*st).stage = STAGE_DIFFERENCE_BSDF;

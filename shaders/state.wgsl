@@ -98,6 +98,7 @@ struct PathState {
     difference_depth: u32,
     difference_lambertian: u32,
     mask: u32,
+    indirect: u32,
     rays: RayCounts,
 }
 

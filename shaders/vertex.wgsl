@@ -19,7 +19,7 @@ const ROULETTE_FROM_DEPTH: u32 = 2u;
 const ROULETTE_GAIN: f32 = 4.0;
 const CONE_ROULETTE_GAIN: f32 = 8.0;
 const CONE_ROULETTE_FLOOR: f32 = 0.1;
-const RECURSION_ROULETTE_GAIN: f32 = 4.0;
+const RECURSION_ROULETTE_GAIN: f32 = 1.0;
 const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
 const SHADOW_SHORTEN: f32 = 2e-5;
 const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
@@ -63,7 +63,7 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
         let reach = cone_solid_angle_fraction(s.position, s.ns);
         roulette.cone = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
         if bsdf_is_lambertian(s) {
-            roulette.bsdf = clamp(RECURSION_ROULETTE_GAIN * strength * reach, RECURSION_ROULETTE_FLOOR, 1.0);
+            roulette.bsdf = clamp(RECURSION_ROULETTE_GAIN * strength, RECURSION_ROULETTE_FLOOR, 1.0);
         }
     }
     next_event(st, s, wo, roulette);

@@ -46,6 +46,13 @@ pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {
 /// Adds light to what the present mode accumulates into.
 pub fn accumulate(scene: &PackedScene, st: &mut PathState, light: Vec3) {
     let paper = scene.frame.estimator == ESTIMATOR_PAPER;
+    let mut light = light;
+    if st.indirect {
+        let largest = light.abs().max_element();
+        if largest > scene.frame.clamp_indirect {
+            light *= scene.frame.clamp_indirect / largest;
+        }
+    }
     if !(paper && st.mode == MODE_REAL) {
         st.radiance += light;
     }

@@ -167,6 +167,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.direction = st.next_direction;
             st.density = st.next_density;
             st.throughput = st.next_throughput;
+            st.indirect = st.indirect || st.density != DELTA_DENSITY;
             st.t_max = f32::INFINITY;
             if st.mode == MODE_DIFFERENCE {
                 st.stage = STAGE_DIFFERENCE_CONE;
@@ -189,6 +190,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.direction = st.real_direction;
             st.density = st.real_density;
             st.throughput = st.real_throughput;
+            st.indirect = st.indirect || st.density != DELTA_DENSITY;
             plan_vertex(st, st.real_hit);
             continue;
         }
@@ -203,6 +205,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.direction = st.difference_direction;
             st.density = st.difference_density;
             st.throughput = st.difference_throughput;
+            st.indirect = true;
             st.depth = st.difference_depth;
             st.t_max = f32::INFINITY;
             st.stage = STAGE_DIFFERENCE_BSDF;

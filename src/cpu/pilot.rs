@@ -10,10 +10,11 @@ use crate::accel::Ray;
 use crate::camera::lens::camera_ray;
 use crate::light::cones::{cone_solid_angle_fraction, direction_meets_spheres};
 use crate::light::environment::env_sample;
-use crate::math::{hash_combine, hash_u32, uniform_from_bits};
+use crate::math::{hash_combine, hash_u32, luminance, uniform_from_bits};
 use crate::packed::{
-    Frame, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, Light, NONE,
-    PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene, PixelInfo,
+    Frame, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT,
+    LIGHT_TRIANGLE, Light, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene,
+    PixelInfo,
 };
 
 /// Share of the sky (cosine-weighted) covered by virtual geometry from which on every sample is evaluated.
@@ -46,7 +47,7 @@ pub fn pilot(scene: &PackedScene) -> Vec<PixelInfo> {
         aperture_radius: 0.0,
         ..scene.frame
     };
-    let directions = environment_directions(scene);
+    let lights = PilotLights::of(scene);
     let mut pixels: Vec<PixelInfo> = (0..width * height)
         .into_par_iter()
         .map(|i| {
@@ -58,7 +59,7 @@ pub fn pilot(scene: &PackedScene) -> Vec<PixelInfo> {
             };
             let out_of_reach = flags == 0 && !beam.may_meet_real(scene);
             PixelInfo {
-                difference_probability: difference_probability(scene, &beam, &directions),
+                difference_probability: difference_probability(scene, &beam, &lights),
                 flags: flags | if out_of_reach { PIXEL_OUT_OF_REACH } else { 0 },
             }
         })
@@ -146,6 +147,42 @@ impl Beam {
     }
 }
 
+/// The lights that matter to the pilot.
+struct PilotLights<'a> {
+    /// Real lights, whose shadows may fall far from what casts them.
+    examined: Vec<&'a Light>,
+    /// Too many to examine, or virtual ones that shine everywhere.
+    uncertain: bool,
+    /// [`REACH_GAIN`], larger where virtual surfaces emit.
+    reach_gain: f32,
+    /// Directions drawn from the environment by its brightness.
+    directions: Vec<Vec3>,
+}
+
+impl<'a> PilotLights<'a> {
+    fn of(scene: &'a PackedScene) -> Self {
+        let is_area = |l: &Light| l.kind == LIGHT_QUAD || l.kind == LIGHT_TRIANGLE;
+        let examined: Vec<&Light> = scene
+            .lights
+            .iter()
+            .filter(|l| l.side == 0 && l.kind != LIGHT_ENVIRONMENT)
+            .collect();
+        let emission = scene
+            .lights
+            .iter()
+            .filter(|l| l.side == 1 && is_area(l))
+            .map(|l| luminance(Vec3::new(l.radiance[0], l.radiance[1], l.radiance[2])))
+            .fold(0.0, f32::max);
+        Self {
+            uncertain: examined.len() > MAX_LIGHTS_EXAMINED
+                || scene.lights.iter().any(|l| l.side == 1 && !is_area(l)),
+            examined,
+            reach_gain: REACH_GAIN * (1.0 + emission * scene.frame.exposure_scale),
+            directions: environment_directions(scene),
+        }
+    }
+}
+
 /// A fixed handful of directions drawn from the environment by its brightness.
 fn environment_directions(scene: &PackedScene) -> Vec<Vec3> {
     if scene.frame.env_light == NONE {
@@ -159,7 +196,7 @@ fn environment_directions(scene: &PackedScene) -> Vec<Vec3> {
         .collect()
 }
 
-fn difference_probability(scene: &PackedScene, beam: &Beam, directions: &[Vec3]) -> f32 {
+fn difference_probability(scene: &PackedScene, beam: &Beam, lights: &PilotLights<'_>) -> f32 {
     let ray = Ray {
         origin: beam.origin,
         direction: beam.direction,
@@ -184,16 +221,18 @@ fn difference_probability(scene: &PackedScene, beam: &Beam, directions: &[Vec3])
     } else {
         normal
     };
-    let mut importance = REACH_GAIN * cone_solid_angle_fraction(&scene.frame, position, normal);
-    if scene.lights.len() > MAX_LIGHTS_EXAMINED
-        || scene
-            .lights
+    let mut importance =
+        lights.reach_gain * cone_solid_angle_fraction(&scene.frame, position, normal);
+    if lights.uncertain
+        || lights
+            .examined
             .iter()
             .any(|l| light_may_be_blocked(&scene.frame, l, position))
     {
         importance = 1.0;
     }
-    let blocked = directions
+    let blocked = lights
+        .directions
         .iter()
         .filter(|&&d| d.dot(normal) > 0.0 && direction_meets_spheres(&scene.frame, position, d))
         .count();
@@ -201,14 +240,8 @@ fn difference_probability(scene: &PackedScene, beam: &Beam, directions: &[Vec3])
     importance.clamp(PROBABILITY_FLOOR, 1.0)
 }
 
-/// Whether something virtual may stand between the point and a light other than the environment, or the light is itself virtual.
+/// Whether something virtual may stand between the point and a light other than the environment.
 fn light_may_be_blocked(frame: &Frame, light: &Light, position: Vec3) -> bool {
-    if light.kind == LIGHT_ENVIRONMENT {
-        return false;
-    }
-    if light.side == 1 {
-        return true;
-    }
     let v = |a: [f32; 4]| Vec3::new(a[0], a[1], a[2]);
     let (centre, radius) = match light.kind {
         LIGHT_DIRECTIONAL => return direction_meets_spheres(frame, position, -v(light.axis_u)),

@@ -119,6 +119,8 @@ pub struct PathState {
     /// Sum of the densities of the techniques that could have drawn the present direction, over the number of lights drawn at the vertex it
     /// leaves (so that it compares with one light's density); DELTA_DENSITY: one technique only.
     pub density: f32,
+    /// The path has scattered other than by a mirror or a smooth interface: what it finds is clamped.
+    pub indirect: bool,
 
     // A vertex's shadow ray and its continuation.
     pub shadow_direction: Vec3,
@@ -187,6 +189,7 @@ impl PathState {
             vertex_hit: MISS,
             throughput: Vec3::ONE,
             density: DELTA_DENSITY,
+            indirect: false,
             shadow_direction: Vec3::ZERO,
             shadow_t_max: 0.0,
             shadow_contribution: Vec3::ZERO,

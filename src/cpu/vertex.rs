@@ -22,7 +22,7 @@ const ROULETTE_GAIN: f32 = 4.0;
 /// than the floor's probability.
 const CONE_ROULETTE_GAIN: f32 = 8.0;
 const CONE_ROULETTE_FLOOR: f32 = 0.1;
-const RECURSION_ROULETTE_GAIN: f32 = 4.0;
+const RECURSION_ROULETTE_GAIN: f32 = 1.0;
 const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
 /// A light's own surface must not block it: shadow rays end this much short of it, relative to the distance and in position errors.
 const SHADOW_SHORTEN: f32 = 2e-5;
@@ -82,7 +82,7 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
         roulette.cone = (CONE_ROULETTE_GAIN * strength * reach).clamp(CONE_ROULETTE_FLOOR, 1.0);
         if bsdf_is_lambertian(s) {
             roulette.bsdf =
-                (RECURSION_ROULETTE_GAIN * strength * reach).clamp(RECURSION_ROULETTE_FLOOR, 1.0);
+                (RECURSION_ROULETTE_GAIN * strength).clamp(RECURSION_ROULETTE_FLOOR, 1.0);
         }
     }
     next_event(scene, st, s, wo, roulette);

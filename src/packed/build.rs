@@ -127,6 +127,7 @@ impl PackedScene {
         frame.seed = settings.seed;
         frame.rays_total = settings.rays_per_pixel;
         frame.max_bounces = settings.max_bounces;
+        frame.clamp_indirect = settings.clamp_indirect.min(f32::MAX);
         frame.sampler = match settings.sampler {
             SamplerKind::Jittered => 0,
             SamplerKind::Cmj => 1,

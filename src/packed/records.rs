@@ -58,6 +58,11 @@ pub struct Frame {
     pub virtual_node_base: u32,
     /// GPU traversal: first triangle of the virtual BVH in the concatenated triangle buffer.
     pub virtual_leaf_base: u32,
+    /// Largest radiance that an indirect contribution may have; infinity: off.
+    pub clamp_indirect: f32,
+    pub pad_0: f32,
+    pub pad_1: f32,
+    pub pad_2: f32,
     /// Median albedo for photo-albedo points that the camera does not see, w unused.
     pub photo_albedo_median: [f32; 4],
     /// Bounding spheres of the virtual geometry: centre, radius.

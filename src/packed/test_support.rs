@@ -35,6 +35,7 @@ pub fn test_scene() -> Scene {
         settings: Settings {
             rays_per_pixel: 4,
             max_bounces: 2,
+            clamp_indirect: f32::INFINITY,
             seed: 0,
             estimator: Estimator::Direct,
             sampler: SamplerKind::Sobol,

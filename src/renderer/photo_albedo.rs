@@ -20,8 +20,8 @@ const MAX_ALBEDO: f32 = 0.98;
 const FIRST_ALBEDO: f32 = 0.5;
 /// Grid pitch of the irradiance estimate in pixels, and its rays per grid point.
 const GRID_PITCH_PX: usize = 4;
-const GRID_RAYS: u32 = 64;
-const ROUNDS: usize = 3;
+const GRID_RAYS: u32 = 32;
+const ROUNDS: usize = 2;
 /// Half-width of the spreading filter in grid points; relative depth and normal tolerances.
 const FILTER_RADIUS: isize = 3;
 const DEPTH_TOLERANCE: f32 = 0.02;

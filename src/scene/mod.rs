@@ -362,6 +362,9 @@ pub struct Settings {
     pub rays_per_pixel: u32,
     /// Surface interactions before the light: 1 is direct light only.
     pub max_bounces: u32,
+    /// Largest radiance that light arriving after a scattering bounce may add, in the scene's units; infinity: off. It takes the speckles
+    /// of caustics away and is a bias, so it is off unless asked for.
+    pub clamp_indirect: f32,
     pub seed: u32,
     pub estimator: Estimator,
     pub sampler: SamplerKind,

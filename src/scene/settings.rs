@@ -1,7 +1,7 @@
 //! `[render]`, and the flags that win over it.
 
 use super::error::Result;
-use super::reader::{Choice, Table};
+use super::reader::{Choice, Node, Table};
 use super::{BackendChoice, Composite, Estimator, Exposure, SamplerKind, Settings, Side};
 
 impl Choice for Side {
@@ -37,6 +37,7 @@ impl Default for Settings {
         Self {
             rays_per_pixel: 49,
             max_bounces: 4,
+            clamp_indirect: f32::INFINITY,
             seed: 0,
             estimator: Estimator::Direct,
             sampler: SamplerKind::Sobol,
@@ -82,6 +83,7 @@ pub struct Overrides {
 const KEYS: &[&str] = &[
     "rays_per_pixel",
     "max_bounces",
+    "clamp_indirect",
     "seed",
     "estimator",
     "sampler",
@@ -96,6 +98,9 @@ pub(super) fn read_settings(root: &Table, exposure: Exposure) -> Result<Settings
         ..Settings::default()
     };
     if let Some(table) = root.table("render", "[render]", KEYS)? {
+        if let Some(clamp) = table.optional("clamp_indirect", Node::positive_or_infinite)? {
+            settings.clamp_indirect = clamp as f32;
+        }
         settings.apply(&Overrides {
             rays_per_pixel: table.optional("rays_per_pixel", |node| {
                 node.integer(1, Settings::MAX_RAYS_PER_PIXEL)

@@ -8,7 +8,7 @@ use crate::gpu::{Features, SceneBuffers, SceneParts};
 use crate::light::cones::{
     cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
 };
-use crate::light::environment::{env_direction_pdf, env_radiance};
+use crate::light::environment::env_radiance;
 use crate::light::lights::{env_pdf, light_pdf_hit, light_sample, light_select};
 use crate::packed::PackedScene;
 use crate::scene::{Environment, EnvironmentMap, LightKind};
@@ -167,25 +167,16 @@ fn shaders_agree_with_their_twins() {
         scale: 1.0,
     };
     for environment in [map, constant] {
-        let packed = scene(environment);
+        let packed = scene(environment.clone());
         let Some(share) = disagreement(&packed, &packed) else {
             return;
         };
         assert!(share < 1e-3, "{share}");
         // Negative control: lights a thousandth brighter.
-        let mut other = scene(Environment {
-            map: EnvironmentMap::Constant([0.5; 3]),
-            rotation_deg: 0.0,
-            scale: 1.0,
-        });
-        std::mem::swap(&mut other.env_texels, &mut Vec::new());
+        let mut other = scene(environment);
         for light in &mut other.lights {
             light.radiance[0] *= 1.001;
         }
-        other.env_texels.clone_from(&packed.env_texels);
-        other.env_cdf.clone_from(&packed.env_cdf);
-        other.frame = packed.frame;
         assert!(disagreement(&packed, &other).is_some_and(|share| share > 5e-3));
-        assert!(env_direction_pdf(&packed, Vec3::X) > 0.0);
     }
 }

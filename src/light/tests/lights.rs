@@ -41,7 +41,8 @@ fn the_alias_table_has_the_stated_probabilities() {
         assert!((stated.iter().sum::<f64>() - 1.0).abs() < 1e-6);
         for (found, stated) in found.iter().zip(&stated) {
             assert!((found - stated).abs() < 1e-7, "{found} {stated}");
-            assert!(*stated >= 0.5 / n as f64);
+            // However dim, a light keeps its uniform share.
+            assert!(*stated > 0.199_999 / n as f64);
         }
         // What is drawn is what the table says, and is not uniform.
         let mut random = Random::new(2);

@@ -98,7 +98,8 @@ fn samples_follow_the_density_and_carry_the_form_factor() {
         let mut densities = Vec::new();
         let samples = 100_000;
         let mut energy = 0.0;
-        let normal = toward.normalize();
+        // Faces the quad, so that all of it is above the horizon.
+        let normal = -quad.u.cross(quad.v).normalize();
         let result = fit(
             samples,
             || {
