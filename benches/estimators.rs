@@ -34,7 +34,7 @@ const REPEATS: u32 = 2;
 const REFERENCE_RAYS: u32 = 1024;
 const REFERENCE_SEED: u32 = 1_000_003;
 
-type Failure = Box<dyn std::error::Error>;
+type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 fn main() -> Result<(), Failure> {
     let given: Vec<PathBuf> = std::env::args()
