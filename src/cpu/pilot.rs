@@ -18,9 +18,12 @@ use crate::packed::{
 };
 
 /// Share of the sky (cosine-weighted) covered by virtual geometry from which on every sample is evaluated.
-const REACH_GAIN: f32 = 16.0;
+const REACH_GAIN: f32 = 2.0;
 /// Far from everything one sample in this many is evaluated.
-const LONGEST_PERIOD: f32 = 16.0;
+const LONGEST_PERIOD: f32 = 64.0;
+/// Importance of a point whose light from a lamp something virtual may block, and per share of the environment's light that may be blocked.
+const LAMP_IMPORTANCE: f32 = 0.25;
+const ENVIRONMENT_GAIN: f32 = 1.0;
 /// Environment directions tried per pixel for blocked light.
 const ENVIRONMENT_TRIALS: u32 = 16;
 /// Lights examined per pixel; scenes with more get certainty instead of an estimate.
@@ -229,14 +232,14 @@ fn difference_period(scene: &PackedScene, beam: &Beam, lights: &PilotLights<'_>)
             .iter()
             .any(|l| light_may_be_blocked(&scene.frame, l, position))
     {
-        importance = 1.0;
+        importance = importance.max(LAMP_IMPORTANCE);
     }
     let blocked = lights
         .directions
         .iter()
         .filter(|&&d| d.dot(normal) > 0.0 && direction_meets_spheres(&scene.frame, position, d))
         .count();
-    importance += 4.0 * blocked as f32 / ENVIRONMENT_TRIALS as f32;
+    importance += ENVIRONMENT_GAIN * blocked as f32 / ENVIRONMENT_TRIALS as f32;
     (1.0 / importance).clamp(1.0, LONGEST_PERIOD).round() as u32
 }
 
