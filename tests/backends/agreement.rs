@@ -31,7 +31,10 @@ pub fn load_in(folder: &Path, text: &str) -> Scene {
 }
 
 pub fn renderer(scene: Scene, all_planes: bool) -> Renderer {
-    let options = RendererOptions { all_planes };
+    let options = RendererOptions {
+        all_planes,
+        ..RendererOptions::default()
+    };
     Renderer::new(scene, options).unwrap_or_else(|error| panic!("{error}"))
 }
 

@@ -65,7 +65,7 @@ fn analytic(pixel: u32) -> f64 {
 
 /// Means over rings about the axis of the difference over its analytic value; pixels whose rays can meet the sphere are left out.
 fn rings(renderer: &Renderer) -> Vec<f64> {
-    let mut sums = vec![(0.0, 0.0); RINGS];
+    let mut sums = [(0.0, 0.0); RINGS];
     for (pixel, value) in renderer.picture().linear.iter().enumerate() {
         let (x, y) = (pixel as f64 % 32.0 - 15.5, (pixel / 32) as f64 - 15.5);
         if renderer.film().pixels[pixel].m > 0 {

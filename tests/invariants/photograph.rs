@@ -14,7 +14,7 @@ const HEIGHT: u32 = 24;
 /// Every code value in some pixel, in no order.
 fn codes(count: u32, levels: u32) -> Vec<u16> {
     (0..count)
-        .map(|i| (i.wrapping_mul(2_654_435_761) >> 8 ^ i * 40_503) % levels)
+        .map(|i| ((i.wrapping_mul(2_654_435_761) >> 8) ^ (i * 40_503)) % levels)
         .map(|code| code as u16)
         .collect()
 }
