@@ -1,44 +1,35 @@
 //! What each material model was made to show.
 
 use glam::DVec3;
-use mixray::scene::Scene;
 
 use super::*;
-
-/// World-space bounds of one part.
-fn bounds_of(scene: &Scene, wanted: impl Fn(&Instance) -> bool) -> [DVec3; 2] {
-    let mut part = scene.clone();
-    keep(&mut part, wanted);
-    bounds(&part)
-}
 
 /// Six rows of dielectrics and six of metals, from white to black; in each row eleven spheres, from smooth to rough.
 #[test]
 fn the_ramps_of_spheres_fall() {
-    let Some(mut scene) = model("PBR_Spheres.glb", WHITE_SKY) else {
+    let Some(scene) = model("PBR_Spheres.glb", WHITE_SKY) else {
         return;
     };
-    frame(&mut scene, [0.0, 0.0, 1.0]);
-    scene.camera.fx *= 1.35;
-    scene.camera.fy *= 1.35;
-    scene.settings.max_bounces = 1;
-    scene.settings.rays_per_pixel = 256;
-    let column = |name: &str, number: usize| {
-        let [low, high] = bounds_of(&scene, |i| i.material.name == name);
+    let row = |material: String| {
+        let mut row = scene.clone();
+        keep(&mut row, |i| i.material.name == material);
+        frame(&mut row, [0.0, 0.0, 1.0]);
+        row.camera.fx *= 1.3;
+        row.camera.fy *= 1.3;
+        row.settings.max_bounces = 1;
+        row.settings.rays_per_pixel = 64;
+        let [low, high] = bounds(&row);
         let radius = (high.y - low.y) / 2.0;
-        let along = (number as f64) / 10.0;
-        let x = low.x + radius + along * (high.x - low.x - 2.0 * radius);
-        project(&scene, DVec3::new(x, (low.y + high.y) / 2.0, high.z))
+        let places: [_; 11] = std::array::from_fn(|number| {
+            let x = low.x + radius + 0.1 * number as f64 * (high.x - low.x - 2.0 * radius);
+            project(&row, DVec3::new(x, low.y + radius, high.z))
+        });
+        let shot = shoot(row);
+        places.map(|at| shot.mean_around(at, 0.75).x)
     };
-    let rows = ["", "_Metal"].map(|kind| {
-        [0, 20, 40, 60, 80, 100].map(|percent| {
-            let name = format!("Black_{percent:02}{kind}");
-            std::array::from_fn::<_, 11, _>(|number| column(&name, number))
-        })
+    let [dielectrics, metals] = ["", "_Metal"].map(|kind| {
+        [0, 20, 40, 60, 80, 100].map(|percent| row(format!("Black_{percent:02}{kind}")))
     });
-    let shot = shoot(scene);
-    let [dielectrics, metals] =
-        rows.map(|rows| rows.map(|row| row.map(|at| shot.mean_around(at, 0.75).x)));
     for rows in [&dielectrics, &metals] {
         for (lighter, darker) in rows.iter().zip(&rows[1..]) {
             assert!(
@@ -56,10 +47,11 @@ fn the_ramps_of_spheres_fall() {
     // A smooth white metal mirrors the white sky; single scattering loses more the rougher it is.
     assert!((white[0] - 1.0).abs() < 0.01, "{white:?}");
     assert!(
-        white.windows(2).all(|pair| pair[1] < pair[0] + 0.01),
+        white.windows(2).all(|pair| pair[1] < pair[0] + 0.04),
         "{white:?}"
     );
-    assert!(white[10] < 0.75, "{white:?}");
+    // With alpha 1 and seen at right angles it keeps 1 - ln 2 = 0.307; the spheres are averaged up to half their radius.
+    assert!(white[10] > 0.3 && white[10] < 0.42, "{white:?}");
 }
 
 /// With the light of its lamps and without; in the dark only they are seen.
@@ -117,11 +109,10 @@ fn a_coat_adds_its_reflection_to_the_base() {
             let shot = shoot(scene);
             shot.mean_around([32.0, 24.0], 10.0)
         });
-        eprintln!("{row}: {base} {coated} {coat}");
         let expected = base * 0.96 + coat;
         for c in 0..3 {
             assert!(
-                (coated[c] / expected[c] - 1.0).abs() < 0.15,
+                (coated[c] / expected[c] - 1.0).abs() < 0.1,
                 "{row}: {coated} for {expected}"
             );
         }
@@ -153,7 +144,6 @@ fn the_glass_cover_shows_what_is_behind_it() {
         sum / covered
     };
     let glass = through(scene);
-    eprintln!("{glass}");
     assert!(glass.y > 0.4 && glass.y < 1.0 && glass.x < 0.05, "{glass}");
     let control = through(opaque);
     assert!(control.y < 0.3 * glass.y, "negative control: {control}");
