@@ -26,7 +26,7 @@ from mathutils import Matrix, Vector
 from PIL import Image, ImageDraw
 
 WIDTH, HEIGHT = 240, 180
-BOUNCES = 8
+BOUNCES = 32  # light that the rim of a glass dish guides along takes more than 8
 MODES_WITH_TRIANGLES = ["04", "05", "06", "11", "12", "13", "14", "15"]
 
 
