@@ -3,14 +3,14 @@
 import package::bindings::{NONE, frame, pixels, FRAME_AOVS, FRAME_ENV_DRAWN, PIXEL_BEAM_MAY_MEET_VIRTUAL};
 import package::bsdf::bsdf_albedo;
 import package::cones::cone_pdf;
-import package::contribution::{SET_PRIMARY_ROULETTE, accumulate, density_weight, sample_key};
+import package::contribution::{accumulate, density_weight, sample_key};
 import package::environment::env_radiance;
 import package::lens::camera_ray;
 import package::lights::env_pdf;
-import package::math::dot3;
+import package::math::{dot3, hash_combine, hash_u32};
 import package::sampler::sample_4d;
 import package::state::{
-    DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_REAL,
+    COINCIDENCE, DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_REAL,
     PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_REAL,
     REQUEST_CLOSEST_VIRTUAL, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
     REQUEST_VIRTUAL_THEN_REAL, STAGE_DIFFERENCE_BSDF, STAGE_DIFFERENCE_CONE, STAGE_DIFFERENCE_SHADOW, STAGE_DONE,
@@ -20,18 +20,41 @@ import package::surface::{Surface, surface_at};
 import package::trace::Hit;
 import package::vertex::shade_vertex;
 
-const COINCIDENCE: f32 = 1e-5;
+const TURN_SALT: u32 = 0x7f4a7c15u;
+
+fn difference_turn(pixel: u32, index: u32) -> u32 {
+    let period = pixels[pixel].difference_period;
+    if period <= 1u { return index; }
+    let offset = turn_offset(pixel, period);
+    if (index + offset) % period == period - 1u { return (index + offset) / period; }
+    return NONE;
+}
+
+fn turn_offset(pixel: u32, period: u32) -> u32 {
+    return hash_u32(hash_combine(frame.seed ^ TURN_SALT, pixel)) % period;
+}
 
 fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
     var st = path_state(pixel, index);
+    let may_meet_virtual = (pixels[pixel].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u;
+    st.rays.primary = select(1u, 0u, is_real_pass);
+    @if(!paper) {
+        if !is_real_pass && !may_meet_virtual {
+            let turn = difference_turn(pixel, index);
+            if turn != NONE {
+                st.index = turn;
+            } else if (frame.flags & FRAME_AOVS) == 0u {
+                return st;
+            }
+            primary_missed_virtual(&st, turn != NONE);
+        }
+    }
     let u = sample_4d(sample_key(&st), 0u);
     let x = f32(pixel % frame.width) + u.x;
     let y = f32(pixel / frame.width) + u.y;
     let ray = camera_ray(x, y, u.z, u.w);
     st.position = ray.origin;
     st.direction = ray.direction;
-    let may_meet_virtual = (pixels[pixel].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u;
-    st.rays.primary = select(1u, 0u, is_real_pass);
     if is_real_pass {
         st.stage = STAGE_REAL_PASS;
         st.request = select(REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_EACH, may_meet_virtual);
@@ -46,8 +69,6 @@ fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
         if may_meet_virtual {
             st.stage = STAGE_PRIMARY_VIRTUAL;
             st.request = REQUEST_CLOSEST_VIRTUAL;
-        } else {
-            primary_missed_virtual(&st);
         }
     }
     return st;
@@ -57,14 +78,14 @@ fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
 fn advance(st: ptr<function, PathState>) {
     var goes_on = true;
     switch (*st).stage {
-        case STAGE_PRIMARY_VIRTUAL: { goes_on = primary_virtual(st); }
-        case STAGE_PRIMARY_REAL: { primary_real(st); }
+        @if(!paper) case STAGE_PRIMARY_VIRTUAL: { goes_on = primary_virtual(st); }
+        @if(!paper) case STAGE_PRIMARY_REAL: { primary_real(st); }
         case STAGE_PATH: { goes_on = path_hit(st); }
         case STAGE_PATH_SHADOW: { path_shadow(st); }
-        case STAGE_PAPER_BEHIND: { paper_behind(st); }
-        case STAGE_DIFFERENCE_SHADOW: { difference_shadow(st); }
-        case STAGE_DIFFERENCE_CONE: { difference_cone(st); }
-        case STAGE_DIFFERENCE_BSDF: { difference_bsdf(st); }
+        @if(paper) case STAGE_PAPER_BEHIND: { paper_behind(st); }
+        @if(!paper) case STAGE_DIFFERENCE_SHADOW: { difference_shadow(st); }
+        @if(!paper) case STAGE_DIFFERENCE_CONE: { difference_cone(st); }
+        @if(!paper) case STAGE_DIFFERENCE_BSDF: { difference_bsdf(st); }
         case STAGE_REAL_PASS: { real_pass(st); }
         default: {}
     }
@@ -76,15 +97,10 @@ fn virtual_is_nearer(hit_virtual: Hit, hit_real: Hit) -> bool {
     return hit_real.triangle == NONE || hit_virtual.t <= hit_real.t * (1.0 + COINCIDENCE);
 }
 
-fn primary_missed_virtual(st: ptr<function, PathState>) {
-    let probability = pixels[(*st).pixel].difference_probability;
-    var survives = true;
-    if probability < 1.0 {
-        let u = sample_4d(sample_key(st), SET_PRIMARY_ROULETTE);
-        survives = u.x < probability;
-    }
-    (*st).throughput = vec3<f32>(select(0.0, 1.0 / probability, survives));
-    if survives || (frame.flags & FRAME_AOVS) != 0u {
+fn primary_missed_virtual(st: ptr<function, PathState>, has_turn: bool) {
+    let period = pixels[(*st).pixel].difference_period;
+    (*st).throughput = vec3<f32>(select(0.0, f32(period), has_turn));
+    if has_turn || (frame.flags & FRAME_AOVS) != 0u {
         (*st).stage = STAGE_PRIMARY_REAL;
         (*st).request = REQUEST_CLOSEST_REAL;
         (*st).hit_virtual = miss();
@@ -96,7 +112,7 @@ fn primary_missed_virtual(st: ptr<function, PathState>) {
 // False: the state already asks for its next ray, or is done.
 fn primary_virtual(st: ptr<function, PathState>) -> bool {
     if (*st).hit_virtual.triangle == NONE {
-        primary_missed_virtual(st);
+        primary_missed_virtual(st, difference_turn((*st).pixel, (*st).index) != NONE);
     } else {
         (*st).stage = STAGE_PRIMARY_REAL;
         (*st).request = REQUEST_CLOSEST_REAL;
@@ -152,6 +168,7 @@ fn resume(st: ptr<function, PathState>) {
             (*st).direction = (*st).next_direction;
             (*st).density = (*st).next_density;
             (*st).throughput = (*st).next_throughput;
+            (*st).medium = (*st).next_medium;
             if (*st).density != DELTA_DENSITY { (*st).indirect = 1u; }
             (*st).t_max = FAR;
             if (*st).mode == MODE_DIFFERENCE {
@@ -166,7 +183,7 @@ fn resume(st: ptr<function, PathState>) {
         if ((*st).pending & PENDING_REAL) != 0u {
             (*st).pending &= ~PENDING_REAL;
             (*st).mode = MODE_REAL;
-            (*st).medium = NONE;
+            (*st).medium = (*st).real_medium;
             (*st).depth = (*st).real_depth;
             (*st).direction = (*st).real_direction;
             (*st).density = (*st).real_density;
@@ -175,23 +192,26 @@ fn resume(st: ptr<function, PathState>) {
             plan_vertex(st, (*st).real_hit);
             continue;
         }
-        if ((*st).pending & PENDING_DIFFERENCE) != 0u {
-            (*st).pending &= ~PENDING_DIFFERENCE;
-            (*st).mode = MODE_DIFFERENCE;
-            (*st).medium = NONE;
-            (*st).position = (*st).difference_position;
-            (*st).offset = (*st).difference_offset;
-            (*st).side = 0u;
-            (*st).real_t_min = (*st).difference_t_min;
-            (*st).direction = (*st).difference_direction;
-            (*st).density = (*st).difference_density;
-            (*st).throughput = (*st).difference_throughput;
-            (*st).indirect = 1u;
-            (*st).depth = (*st).difference_depth;
-            (*st).t_max = FAR;
-            (*st).stage = STAGE_DIFFERENCE_BSDF;
-            (*st).request = select(REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, (*st).difference_lambertian != 0u);
-            return;
+        @if(!paper) {
+            if ((*st).pending & PENDING_DIFFERENCE) != 0u {
+                (*st).pending &= ~PENDING_DIFFERENCE;
+                (*st).mode = MODE_DIFFERENCE;
+                (*st).medium = (*st).difference_medium;
+                (*st).position = (*st).difference_position;
+                (*st).offset = (*st).difference_offset;
+                (*st).coincidence_ratio = (*st).difference_coincidence_ratio;
+                (*st).side = 0u;
+                (*st).real_t_min = (*st).difference_t_min;
+                (*st).direction = (*st).difference_direction;
+                (*st).density = (*st).difference_density;
+                (*st).throughput = (*st).difference_throughput;
+                (*st).indirect = 1u;
+                (*st).depth = (*st).difference_depth;
+                (*st).t_max = FAR;
+                (*st).stage = STAGE_DIFFERENCE_BSDF;
+                (*st).request = select(REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, (*st).difference_lambertian != 0u);
+                return;
+            }
         }
         (*st).stage = STAGE_DONE;
         return;
@@ -226,6 +246,7 @@ fn paper_behind(st: ptr<function, PathState>) {
         (*st).real_direction = (*st).direction;
         (*st).real_density = (*st).density;
         (*st).real_throughput = (*st).throughput;
+        (*st).real_medium = (*st).medium;
         (*st).real_depth = (*st).depth;
     } else {
         (*st).mode = MODE_REAL;
@@ -279,9 +300,13 @@ fn difference_bsdf(st: ptr<function, PathState>) {
             }
             split_difference(st);
         }
-    } else if (*st).hit_real.triangle != NONE && (*st).depth < frame.max_bounces {
-        (*st).depth += 1u;
-        plan_vertex(st, (*st).hit_real);
+        return;
+    }
+    @if(multi_bounce) {
+        if (*st).hit_real.triangle != NONE && (*st).depth < frame.max_bounces {
+            (*st).depth += 1u;
+            plan_vertex(st, (*st).hit_real);
+        }
     }
 }
 
@@ -299,6 +324,7 @@ fn split_difference(st: ptr<function, PathState>) {
         (*st).real_direction = (*st).direction;
         (*st).real_density = (*st).density;
         (*st).real_throughput = -(*st).throughput;
+        (*st).real_medium = (*st).medium;
         (*st).real_depth = (*st).depth + 1u;
     }
     (*st).mode = MODE_MIXED;

@@ -3,7 +3,7 @@
 import package::bindings::{NONE, frame, materials, triangles, MATERIAL_ALPHA_MASK, MATERIAL_ALPHA_BLEND};
 import package::math::{dot3, hash_combine, uniform_from_bits};
 import package::state::{
-    PathState, miss,
+    COINCIDENCE, PathState, miss,
     REQUEST_CLOSEST_VIRTUAL, REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_EACH, REQUEST_VIRTUAL_THEN_REAL,
     REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_MIXED, REQUEST_SHADOW_REAL, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
 };
@@ -54,7 +54,7 @@ fn next_query(request: u32, step: u32, t_max: f32, hit_real: Hit, hit_virtual: H
         }
         case REQUEST_REAL_UNLESS_COVERED: {
             if step == 0u { return query(WORLD_REAL, false, t_max); }
-            if step == 1u && met_real { return query(WORLD_VIRTUAL, true, hit_real.t); }
+            if step == 1u && met_real { return query(WORLD_VIRTUAL, true, hit_real.t * (1.0 + COINCIDENCE)); }
         }
         case REQUEST_SHADOW_MIXED: {
             if step == 0u { return query(WORLD_VIRTUAL, true, t_max); }
@@ -151,12 +151,17 @@ fn answer(st: ptr<function, PathState>, thread: u32) {
     (*st).hit_virtual = hit_virtual;
 }
 
-// A ray that leaves a surface starts past it in that surface's own world and before it in the other one, so that it neither meets itself nor
-// slips through what coincides with it.
+// Where a ray starts in its own world and in the other one: see src/cpu/trace.rs.
 fn ray_into(st: ptr<function, PathState>, world: u32, t_max: f32) -> Ray {
     let offset = (*st).offset;
-    let along = select(offset, -offset, dot3((*st).direction, offset) < 0.0);
-    let origin = select((*st).position - along, (*st).position + along, world == (*st).side);
+    var origin = (*st).position;
+    if world == (*st).side {
+        origin += select(offset, -offset, dot3((*st).direction, offset) < 0.0);
+    } else if world == WORLD_REAL {
+        origin += offset * (*st).coincidence_ratio;
+    } else {
+        origin -= offset * (*st).coincidence_ratio;
+    }
     return Ray(origin, select(0.0, (*st).real_t_min, world == WORLD_REAL), (*st).direction, t_max, NONE);
 }
 

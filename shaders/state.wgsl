@@ -37,6 +37,7 @@ const PENDING_DIFFERENCE: u32 = 8u;
 const PENDING_VERTEX: u32 = 16u;
 
 const DELTA_DENSITY: f32 = -1.0;
+const COINCIDENCE: f32 = 1e-5;
 const SIDE_NONE: u32 = 2u;
 // WGSL has no literal for infinity: the largest float stands for it, and misses carry it.
 const FAR: f32 = 3.40282346638528859812e38;
@@ -97,6 +98,11 @@ struct PathState {
     real_depth: u32,
     difference_depth: u32,
     difference_lambertian: u32,
+    next_medium: u32,
+    real_medium: u32,
+    difference_medium: u32,
+    coincidence_ratio: f32,
+    difference_coincidence_ratio: f32,
     mask: u32,
     indirect: u32,
     rays: RayCounts,
@@ -114,6 +120,9 @@ fn path_state(pixel: u32, index: u32) -> PathState {
     st.stage = STAGE_DONE;
     st.mode = MODE_MIXED;
     st.medium = NONE;
+    st.next_medium = NONE;
+    st.real_medium = NONE;
+    st.difference_medium = NONE;
     st.side = SIDE_NONE;
     st.t_max = FAR;
     st.hit_real = miss();

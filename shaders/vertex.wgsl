@@ -8,9 +8,9 @@ import package::contribution::{
     SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CHOICE, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
 };
 import package::lights::{LightSample, light_pdf_hit, light_sample};
-import package::math::exp_;
+import package::math::{dot3, exp_, safe_sqrt};
 import package::state::{
-    DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_SHADOW, PathState,
+    COINCIDENCE, DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_SHADOW, PathState,
     REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED, REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL,
 };
 import package::surface::Surface;
@@ -24,7 +24,7 @@ const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
 const SHADOW_SHORTEN: f32 = 2e-5;
 const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
-const DIFFERENCE_LIGHTS: u32 = 4u;
+const DIFFERENCE_LIGHTS: u32 = 2u;
 const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
 
 struct Roulette {
@@ -36,41 +36,63 @@ fn max_element(v: vec3<f32>) -> f32 {
     return max(max(v.x, v.y), v.z);
 }
 
+// The `paper` estimator knows no such mode.
+fn is_difference(st: ptr<function, PathState>) -> bool {
+    @if(paper) {
+        return false;
+    }
+    @else {
+        return (*st).mode == MODE_DIFFERENCE;
+    }
+}
+
 fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
-    let difference = (*st).mode == MODE_DIFFERENCE;
+    let difference = is_difference(st);
     let wo = -(*st).direction;
     let distance = (*st).vertex_hit.t;
-    if !difference {
-        @if(transmission) {
-            if (*st).medium != NONE {
-                let sigma = materials[(*st).medium].sigma_a;
-                (*st).throughput *= vec3<f32>(exp_(-sigma.x * distance), exp_(-sigma.y * distance), exp_(-sigma.z * distance));
-            }
+    @if(transmission) {
+        if (*st).medium != NONE {
+            let sigma = materials[(*st).medium].sigma_a;
+            (*st).throughput *= vec3<f32>(exp_(-sigma.x * distance), exp_(-sigma.y * distance), exp_(-sigma.z * distance));
         }
+    }
+    if !difference {
         add_emission(st, s, distance);
     }
     if (*st).depth > frame.max_bounces || (s.flags & EMITS_ONLY) != 0u || all((*st).throughput == vec3<f32>(0.0)) {
         return;
     }
+    let side = select(0u, 1u, (*st).vertex_hit.triangle >= frame.real_triangle_count);
+    let leaves_coinciding_real = side == 1u && (*st).side == 0u && coincides(st, s, distance);
+    let reach = 1.0 + COINCIDENCE * distance / s.error;
+    (*st).coincidence_ratio = select(reach, -reach, leaves_coinciding_real);
     (*st).position = s.position;
     (*st).offset = s.ng * s.error;
-    (*st).side = select(0u, 1u, (*st).vertex_hit.triangle >= frame.real_triangle_count);
+    (*st).side = side;
     (*st).real_t_min = materials[s.material].self_shadow_bias;
 
     var roulette = Roulette(1.0, 1.0);
-    if difference {
-        let strength = max_element(abs((*st).throughput * bsdf_albedo(s, wo)));
-        let reach = cone_solid_angle_fraction(s.position, s.ns);
-        roulette.cone = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
-        if bsdf_is_lambertian(s) {
-            roulette.bsdf = clamp(RECURSION_ROULETTE_GAIN * strength, RECURSION_ROULETTE_FLOOR, 1.0);
+    @if(!paper) {
+        if difference {
+            let strength = max_element(abs((*st).throughput * bsdf_albedo(s, wo)));
+            let reach = cone_solid_angle_fraction(s.position, s.ng);
+            roulette.cone = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
+            if bsdf_is_lambertian(s) {
+                roulette.bsdf = clamp(RECURSION_ROULETTE_GAIN * strength, RECURSION_ROULETTE_FLOOR, 1.0);
+            }
         }
     }
     next_event(st, s, wo, roulette);
-    if difference {
-        plan_cone(st, s, wo, roulette);
+    @if(!paper) {
+        if difference { plan_cone(st, s, wo, roulette); }
     }
     plan_continuation(st, s, wo, roulette);
+}
+
+fn coincides(st: ptr<function, PathState>, s: Surface, distance: f32) -> bool {
+    let error2 = dot3((*st).offset, (*st).offset);
+    let errors = 2.0 * (error2 * (1.0 + (*st).coincidence_ratio) + safe_sqrt(error2) * s.error);
+    return abs(dot3((*st).direction, (*st).offset)) * distance <= errors;
 }
 
 fn add_emission(st: ptr<function, PathState>, s: Surface, distance: f32) {
@@ -86,12 +108,12 @@ fn add_emission(st: ptr<function, PathState>, s: Surface, distance: f32) {
 }
 
 fn light_draws(st: ptr<function, PathState>) -> u32 {
-    return select(1u, DIFFERENCE_LIGHTS, (*st).mode == MODE_DIFFERENCE && (*st).depth == 1u);
+    return select(1u, DIFFERENCE_LIGHTS, is_difference(st) && (*st).depth == 1u);
 }
 
 fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
     if frame.light_count == 0u || bsdf_is_delta(s) { return; }
-    let difference = (*st).mode == MODE_DIFFERENCE;
+    let difference = is_difference(st);
     let set_id = select(SET_PATH_LIGHT, SET_DIFFERENCE_LIGHT, difference);
     let count = light_draws(st);
     var choice = vec4<f32>(0.0);
@@ -116,18 +138,22 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette:
 fn light_contribution(
     st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette, l: LightSample, count: f32,
 ) -> vec3<f32> {
-    let difference = (*st).mode == MODE_DIFFERENCE;
+    let difference = is_difference(st);
     let real_light = l.side == 0u;
     if l.pdf <= 0.0 || ((*st).mode == MODE_REAL && !real_light) { return vec3<f32>(0.0); }
-    if difference && real_light && !direction_meets_spheres(s.position, l.direction) { return vec3<f32>(0.0); }
+    @if(!paper) {
+        if difference && real_light && !direction_meets_spheres(s.position, l.direction) { return vec3<f32>(0.0); }
+    }
     let f = bsdf_eval(s, wo, l.direction);
     if max_element(f.f_cos) <= 0.0 { return vec3<f32>(0.0); }
     var weight = 1.0;
     if !l.delta {
         var other = f.pdf;
-        if difference {
-            other = roulette.cone * cone_pdf(s.position, s.ns, l.direction);
-            if !bsdf_is_lambertian(s) { other += f.pdf; }
+        @if(!paper) {
+            if difference {
+                other = roulette.cone * cone_pdf(s.position, s.ng, l.direction);
+                if !bsdf_is_lambertian(s) { other += f.pdf; }
+            }
         }
         weight = count * l.pdf / (count * l.pdf + other);
     }
@@ -143,7 +169,7 @@ fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample) {
     }
     let real_light = l.side == 0u;
     var request = REQUEST_SHADOW_MIXED;
-    if (*st).mode == MODE_DIFFERENCE && real_light { request = REQUEST_SHADOW_DIFFERENCE; }
+    if is_difference(st) && real_light { request = REQUEST_SHADOW_DIFFERENCE; }
     if (*st).mode == MODE_REAL { request = REQUEST_SHADOW_REAL; }
     @if(paper) {
         if (*st).mode == MODE_SHARED && real_light { request = REQUEST_SHADOW_PAIR; }
@@ -155,7 +181,7 @@ fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample) {
 fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
     let u = draw(st, SET_DIFFERENCE_CONE);
     if frame.sphere_count == 0u || u.w >= roulette.cone { return; }
-    let c = cone_sample(s.position, s.ns, u.xyz);
+    let c = cone_sample(s.position, s.ng, u.xyz);
     if c.pdf <= 0.0 { return; }
     let f = bsdf_eval(s, wo, c.direction);
     if max_element(f.f_cos) <= 0.0 { return; }
@@ -165,10 +191,20 @@ fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: 
     (*st).next_direction = c.direction;
     (*st).next_throughput = (*st).throughput * f.f_cos * (1.0 / density);
     (*st).next_density = density / f32(light_draws(st));
+    (*st).next_medium = medium_along(st, s, c.direction);
+}
+
+fn medium_along(st: ptr<function, PathState>, s: Surface, direction: vec3<f32>) -> u32 {
+    @if(transmission) {
+        if (s.flags & MATERIAL_THIN_WALLED) == 0u && dot3(s.ng, direction) < 0.0 {
+            return select(NONE, s.material, s.front);
+        }
+    }
+    return (*st).medium;
 }
 
 fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
-    let difference = (*st).mode == MODE_DIFFERENCE;
+    let difference = is_difference(st);
     if difference && bsdf_is_lambertian(s) && (*st).depth >= frame.max_bounces { return; }
     let u = draw(st, select(SET_PATH_BSDF, SET_DIFFERENCE_BSDF, difference));
     if u.w >= roulette.bsdf { return; }
@@ -176,32 +212,34 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, ro
     if !b.valid { return; }
     let density = select(b.pdf, DELTA_DENSITY, b.delta);
     var throughput = (*st).throughput * b.weight;
-    if difference {
-        (*st).pending |= PENDING_DIFFERENCE;
-        (*st).difference_position = (*st).position;
-        (*st).difference_offset = (*st).offset;
-        (*st).difference_t_min = (*st).real_t_min;
-        (*st).difference_depth = (*st).depth;
-        (*st).difference_direction = b.wi;
-        (*st).difference_lambertian = u32(bsdf_is_lambertian(s));
-        (*st).difference_normal = s.ns;
-        (*st).difference_cone_probability = roulette.cone / f32(light_draws(st));
-        (*st).difference_density = select(b.pdf / f32(light_draws(st)), DELTA_DENSITY, b.delta);
-        (*st).difference_throughput = throughput * (1.0 / roulette.bsdf);
-        return;
+    @if(!paper) {
+        if difference {
+            (*st).pending |= PENDING_DIFFERENCE;
+            (*st).difference_position = (*st).position;
+            (*st).difference_offset = (*st).offset;
+            (*st).difference_coincidence_ratio = (*st).coincidence_ratio;
+            (*st).difference_t_min = (*st).real_t_min;
+            (*st).difference_depth = (*st).depth;
+            (*st).difference_direction = b.wi;
+            (*st).difference_lambertian = u32(bsdf_is_lambertian(s));
+            (*st).difference_normal = s.ng;
+            (*st).difference_cone_probability = roulette.cone / f32(light_draws(st));
+            (*st).difference_density = select(b.pdf / f32(light_draws(st)), DELTA_DENSITY, b.delta);
+            (*st).difference_throughput = throughput * (1.0 / roulette.bsdf);
+            (*st).difference_medium = medium_along(st, s, b.wi);
+            return;
+        }
     }
-    if (*st).depth >= ROULETTE_FROM_DEPTH {
-        let survival = min(ROULETTE_GAIN * max_element(abs(throughput)), 1.0);
-        if u.w >= survival { return; }
-        throughput *= 1.0 / survival;
-    }
-    @if(transmission) {
-        if b.transmitted && (s.flags & MATERIAL_THIN_WALLED) == 0u {
-            (*st).medium = select(NONE, s.material, s.front);
+    @if(multi_bounce) {
+        if (*st).depth >= ROULETTE_FROM_DEPTH {
+            let survival = min(ROULETTE_GAIN * max_element(abs(throughput)), 1.0);
+            if u.w >= survival { return; }
+            throughput *= 1.0 / survival;
         }
     }
     (*st).pending |= PENDING_NEXT;
     (*st).next_direction = b.wi;
     (*st).next_throughput = throughput;
     (*st).next_density = density;
+    (*st).next_medium = medium_along(st, s, b.wi);
 }

@@ -24,7 +24,14 @@ fn load(name: &str) -> Scene {
 }
 
 fn render(scene: Scene) -> Renderer {
-    let mut renderer = Renderer::new(scene, RendererOptions { all_planes: true }).unwrap();
+    let mut renderer = Renderer::new(
+        scene,
+        RendererOptions {
+            all_planes: true,
+            ..RendererOptions::default()
+        },
+    )
+    .unwrap();
     renderer
         .advance(Budget::Complete, &|| false, &mut |_| ())
         .unwrap();

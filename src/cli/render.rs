@@ -132,6 +132,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
 
     let options = RendererOptions {
         all_planes: targets.iter().any(|t| t.format() == Format::Exr),
+        ..RendererOptions::default()
     };
     let mut renderer = Renderer::new(scene, options)?;
     let interrupted = interrupt::watch()?;

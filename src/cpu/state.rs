@@ -69,6 +69,9 @@ pub const PENDING_DIFFERENCE: u32 = 8;
 /// Density that stands for a delta distribution: no other technique can find its directions.
 pub const DELTA_DENSITY: f32 = -1.0;
 
+/// A virtual hit counts as nearer within this relative distance, so that a base lying in the table's plane covers the table.
+pub const COINCIDENCE: f32 = 1e-5;
+
 /// No surface: a ray from the camera.
 pub const SIDE_NONE: u32 = 2;
 
@@ -102,6 +105,9 @@ pub struct PathState {
     /// Vertex the ray leaves, and its geometric normal times the position's error bound.
     pub position: Vec3,
     pub offset: Vec3,
+    /// Times `offset`: how far from the vertex its surface may coincide with one of the other world; negative where a path has come to a
+    /// virtual surface from a real one that coincides with it, which then lies behind.
+    pub coincidence_ratio: f32,
     /// World of that vertex: 0 real, 1 virtual, SIDE_NONE.
     pub side: u32,
     /// The real world is not met closer than this.
@@ -130,25 +136,29 @@ pub struct PathState {
     pub next_direction: Vec3,
     pub next_density: f32,
     pub next_throughput: Vec3,
+    pub next_medium: u32,
 
     // The real path that starts behind a virtual hit.
     pub real_hit: Hit,
     pub real_direction: Vec3,
     pub real_density: f32,
     pub real_throughput: Vec3,
+    pub real_medium: u32,
     pub real_depth: u32,
 
     // The difference chain's next ray.
     pub difference_position: Vec3,
     pub difference_t_min: f32,
     pub difference_offset: Vec3,
+    pub difference_coincidence_ratio: f32,
     pub difference_depth: u32,
     pub difference_direction: Vec3,
     pub difference_density: f32,
     pub difference_throughput: Vec3,
+    pub difference_medium: u32,
     /// The vertex is Lambertian: what the cones cover is left to them.
     pub difference_lambertian: bool,
-    /// Shading normal and roulette probability of the cones (over the number of lights drawn) at that vertex, to weigh a BSDF direction
+    /// Geometric normal and roulette probability of the cones (over the number of lights drawn) at that vertex, to weigh a BSDF direction
     /// against them.
     pub difference_normal: Vec3,
     pub difference_cone_probability: f32,
@@ -180,6 +190,7 @@ impl PathState {
             request: 0,
             position: Vec3::ZERO,
             offset: Vec3::ZERO,
+            coincidence_ratio: 1.0,
             side: SIDE_NONE,
             real_t_min: 0.0,
             direction: Vec3::ZERO,
@@ -197,18 +208,22 @@ impl PathState {
             next_direction: Vec3::ZERO,
             next_density: 0.0,
             next_throughput: Vec3::ZERO,
+            next_medium: NONE,
             real_hit: MISS,
             real_direction: Vec3::ZERO,
             real_density: 0.0,
             real_throughput: Vec3::ZERO,
+            real_medium: NONE,
             real_depth: 0,
             difference_position: Vec3::ZERO,
             difference_t_min: 0.0,
             difference_offset: Vec3::ZERO,
+            difference_coincidence_ratio: 1.0,
             difference_depth: 0,
             difference_direction: Vec3::ZERO,
             difference_density: 0.0,
             difference_throughput: Vec3::ZERO,
+            difference_medium: NONE,
             difference_lambertian: false,
             difference_normal: Vec3::ZERO,
             difference_cone_probability: 0.0,

@@ -51,7 +51,8 @@ pub fn answer(scene: &PackedScene, st: &mut PathState) {
             hit_real = trace_world(scene, st, WORLD_REAL, t_max, false);
             if hit_real.triangle != NONE {
                 st.rays.mixed += 1;
-                hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, hit_real.t, true);
+                let covering = hit_real.t * (1.0 + COINCIDENCE);
+                hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, covering, true);
             }
         }
         REQUEST_SHADOW_MIXED => {
@@ -96,18 +97,20 @@ const BLOCKED: Hit = Hit {
     triangle: 0,
 };
 
-/// One world's answer. A ray that leaves a surface starts past it in that surface's own world and before it in the other one, so that it
-/// neither meets itself nor slips through what coincides with it.
+/// One world's answer. A ray that leaves a surface starts past it in that surface's own world, so that it does not meet itself. In the other
+/// world it starts as if virtual geometry lay in front of real geometry that coincides with it, as seen from where the path came: a ray
+/// that goes on through a virtual surface then meets the real one, and one that goes back meets it not.
 fn trace_world(scene: &PackedScene, st: &PathState, world: u32, t_max: f32, any_hit: bool) -> Hit {
-    let along = if st.direction.dot(st.offset) < 0.0 {
-        -st.offset
-    } else {
-        st.offset
-    };
     let origin = if world == st.side {
-        st.position + along
+        if st.direction.dot(st.offset) < 0.0 {
+            st.position - st.offset
+        } else {
+            st.position + st.offset
+        }
+    } else if world == WORLD_REAL {
+        st.position + st.offset * st.coincidence_ratio
     } else {
-        st.position - along
+        st.position - st.offset * st.coincidence_ratio
     };
     let mut ray = Ray {
         origin,

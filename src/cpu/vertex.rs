@@ -11,7 +11,7 @@ use crate::light::lights::{LightSample, light_pdf_hit, light_sample};
 use crate::material::{
     Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample,
 };
-use crate::math::exp_;
+use crate::math::{dot3, exp_, safe_sqrt};
 use crate::packed::{MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE, PackedScene};
 
 /// Paths shorter than this are never ended by roulette.
@@ -29,7 +29,7 @@ const SHADOW_SHORTEN: f32 = 2e-5;
 const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
 /// Lights drawn at the first difference vertex, of which one is traced: most directions meet nothing virtual and cost no ray.
-const DIFFERENCE_LIGHTS: u32 = 4;
+const DIFFERENCE_LIGHTS: u32 = 2;
 /// Surfaces that scatter nothing.
 const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
 
@@ -46,15 +46,15 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     let difference = st.mode == MODE_DIFFERENCE;
     let wo = -st.direction;
     let distance = st.vertex_hit.t;
+    if st.medium != NONE {
+        let sigma = scene.materials[st.medium as usize].sigma_a;
+        st.throughput *= Vec3::new(
+            exp_(-sigma[0] * distance),
+            exp_(-sigma[1] * distance),
+            exp_(-sigma[2] * distance),
+        );
+    }
     if !difference {
-        if st.medium != NONE {
-            let sigma = scene.materials[st.medium as usize].sigma_a;
-            st.throughput *= Vec3::new(
-                exp_(-sigma[0] * distance),
-                exp_(-sigma[1] * distance),
-                exp_(-sigma[2] * distance),
-            );
-        }
         add_emission(scene, st, s, distance);
     }
     if st.depth > scene.frame.max_bounces
@@ -63,13 +63,21 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     {
         return;
     }
-    st.position = s.position;
-    st.offset = s.ng * s.error;
-    st.side = if st.vertex_hit.triangle >= scene.frame.real_triangle_count {
+    let side = if st.vertex_hit.triangle >= scene.frame.real_triangle_count {
         1
     } else {
         0
     };
+    let leaves_coinciding_real = side == 1 && st.side == 0 && coincides(st, s, distance);
+    let reach = 1.0 + COINCIDENCE * distance / s.error;
+    st.coincidence_ratio = if leaves_coinciding_real {
+        -reach
+    } else {
+        reach
+    };
+    st.position = s.position;
+    st.offset = s.ng * s.error;
+    st.side = side;
     st.real_t_min = scene.materials[s.material as usize].self_shadow_bias;
 
     let mut roulette = Roulette {
@@ -78,7 +86,7 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     };
     if difference {
         let strength = (st.throughput * bsdf_albedo(s, wo)).abs().max_element();
-        let reach = cone_solid_angle_fraction(&scene.frame, s.position, s.ns);
+        let reach = cone_solid_angle_fraction(&scene.frame, s.position, s.ng);
         roulette.cone = (CONE_ROULETTE_GAIN * strength * reach).clamp(CONE_ROULETTE_FLOOR, 1.0);
         if bsdf_is_lambertian(s) {
             roulette.bsdf =
@@ -90,6 +98,13 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
         plan_cone(scene, st, s, wo, roulette);
     }
     plan_continuation(scene, st, s, wo, roulette);
+}
+
+/// Whether the surface reached lies in the plane of the one that the ray has left, as far as their errors tell.
+fn coincides(st: &PathState, s: &Surface, distance: f32) -> bool {
+    let error2 = dot3(st.offset, st.offset);
+    let errors = 2.0 * (error2 * (1.0 + st.coincidence_ratio) + safe_sqrt(error2) * s.error);
+    dot3(st.direction, st.offset).abs() * distance <= errors
 }
 
 fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: f32) {
@@ -183,7 +198,7 @@ fn light_contribution(
     if !l.delta {
         let mut other = f.pdf;
         if difference {
-            other = roulette.cone * cone_pdf(&scene.frame, s.position, s.ns, l.direction);
+            other = roulette.cone * cone_pdf(&scene.frame, s.position, s.ng, l.direction);
             if !bsdf_is_lambertian(s) {
                 other += f.pdf;
             }
@@ -211,13 +226,14 @@ fn plan_shadow(st: &mut PathState, s: &Surface, l: &LightSample) {
     st.pending |= PENDING_SHADOW;
 }
 
-/// (b): a direction inside the cones of the virtual bounding spheres.
+/// (b): a direction inside the cones of the virtual bounding spheres, above the geometric horizon: smooth shading normals scatter light
+/// from everywhere above it.
 fn plan_cone(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, roulette: Roulette) {
     let u = draw(scene, st, SET_DIFFERENCE_CONE);
     if scene.frame.sphere_count == 0 || u[3] >= roulette.cone {
         return;
     }
-    let c = cone_sample(&scene.frame, s.position, s.ns, [u[0], u[1], u[2]]);
+    let c = cone_sample(&scene.frame, s.position, s.ng, [u[0], u[1], u[2]]);
     if c.pdf <= 0.0 {
         return;
     }
@@ -233,6 +249,15 @@ fn plan_cone(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, rou
     st.next_direction = c.direction;
     st.next_throughput = st.throughput * f.f_cos * (1.0 / density);
     st.next_density = density / light_draws(st) as f32;
+    st.next_medium = medium_along(st, s, c.direction);
+}
+
+/// Material whose volume a direction from the vertex leads through, or NONE.
+fn medium_along(st: &PathState, s: &Surface, direction: Vec3) -> u32 {
+    if s.flags & MATERIAL_THIN_WALLED != 0 || s.ng.dot(direction) >= 0.0 {
+        return st.medium;
+    }
+    if s.front { s.material } else { NONE }
 }
 
 /// The BSDF's own direction: the path's next ray, or (c) the recursion of the difference.
@@ -269,11 +294,12 @@ fn plan_continuation(
         st.pending |= PENDING_DIFFERENCE;
         st.difference_position = st.position;
         st.difference_offset = st.offset;
+        st.difference_coincidence_ratio = st.coincidence_ratio;
         st.difference_t_min = st.real_t_min;
         st.difference_depth = st.depth;
         st.difference_direction = b.wi;
         st.difference_lambertian = bsdf_is_lambertian(s);
-        st.difference_normal = s.ns;
+        st.difference_normal = s.ng;
         st.difference_cone_probability = roulette.cone / light_draws(st) as f32;
         st.difference_density = if b.delta {
             DELTA_DENSITY
@@ -281,6 +307,7 @@ fn plan_continuation(
             b.pdf / light_draws(st) as f32
         };
         st.difference_throughput = throughput * (1.0 / roulette.bsdf);
+        st.difference_medium = medium_along(st, s, b.wi);
         return;
     }
     if st.depth >= ROULETTE_FROM_DEPTH {
@@ -290,11 +317,9 @@ fn plan_continuation(
         }
         throughput *= 1.0 / survival;
     }
-    if b.transmitted && s.flags & MATERIAL_THIN_WALLED == 0 {
-        st.medium = if s.front { s.material } else { NONE };
-    }
     st.pending |= PENDING_NEXT;
     st.next_direction = b.wi;
     st.next_throughput = throughput;
     st.next_density = density;
+    st.next_medium = medium_along(st, s, b.wi);
 }

@@ -43,6 +43,9 @@ const MAX_PASS_SAMPLES: u32 = 8;
 pub struct RendererOptions {
     /// Depth, normal and albedo of the first hit, and the real radiance everywhere.
     pub all_planes: bool,
+    /// The first and the end of the samples to render of each pixel's `rays_per_pixel`; `None`: all. Films of ranges that follow one
+    /// another are put together by [`Renderer::merge`].
+    pub sample_range: Option<(u32, u32)>,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -51,6 +54,10 @@ pub enum RenderError {
     Pack(#[from] crate::packed::PackError),
     #[error(transparent)]
     Gpu(#[from] crate::gpu::GpuError),
+    #[error(transparent)]
+    Merge(#[from] crate::film::MergeError),
+    #[error("the samples {0}..{1} are not a range of the scene's {2} rays per pixel")]
+    SampleRange(u32, u32, u32),
     #[error("there is no object number {0} in the scene")]
     NoSuchObject(usize),
 }
@@ -70,6 +77,8 @@ pub struct Renderer {
     scene: Scene,
     packed: PackedScene,
     film: Film,
+    /// Where the range of samples to render ends; it begins at the film's first.
+    end_sample: u32,
     backend: Backend,
     options: RendererOptions,
     rays: RayTotals,
@@ -89,17 +98,23 @@ impl Renderer {
     /// The scene does not fit the packed form or the adapter, or `gpu` was asked for where there is none.
     pub fn new(scene: Scene, options: RendererOptions) -> Result<Self, RenderError> {
         let start = Instant::now();
+        let total = scene.settings.rays_per_pixel;
+        let (first_sample, end_sample) = options.sample_range.unwrap_or((0, total));
+        if first_sample >= end_sample || end_sample > total {
+            return Err(RenderError::SampleRange(first_sample, end_sample, total));
+        }
         let packed = PackedScene::build(&scene)?;
         let film = Film::new(
             packed.frame.width,
             packed.frame.height,
-            0,
+            first_sample,
             options.all_planes,
         );
         let mut renderer = Self {
             scene,
             packed,
             film,
+            end_sample,
             backend: Backend::Cpu,
             options,
             rays: RayTotals::default(),
@@ -191,7 +206,8 @@ impl Renderer {
             Budget::Time(time) => Some(start + time),
             Budget::Complete | Budget::Rays(_) => None,
         };
-        let total = self.scene.settings.rays_per_pixel;
+        let first = self.film.first_sample;
+        let total = self.end_sample - first;
         let pixels = u64::from(self.film.width) * u64::from(self.film.height);
         let before = self.samples();
         let end = match budget {
@@ -204,7 +220,12 @@ impl Renderer {
         while done < end && !self.nothing_to_trace() {
             let step = done.clamp(1, MAX_PASS_SAMPLES).min(end - done);
             let cancel = Cancel::new(cancelled, deadline);
-            self.run_pass(Pass::Main { end: done + step }, &cancel)?;
+            self.run_pass(
+                Pass::Main {
+                    end: first + done + step,
+                },
+                &cancel,
+            )?;
             if cancel.is_cancelled() {
                 break;
             }
@@ -216,12 +237,28 @@ impl Renderer {
                 elapsed: start.elapsed(),
             });
         }
-        // Short beside the main passes, and without it edge pixels would not be Eq. 4: not cancelled.
-        let everywhere =
-            self.options.all_planes || self.scene.settings.composite == Composite::Quotient;
-        self.run_pass(Pass::Real { everywhere }, &Cancel::new(&|| false, None))?;
+        self.replay_real()?;
         self.seconds.render += start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// Short beside the main passes, and without it edge pixels would not be Eq. 4: not cancelled.
+    fn replay_real(&mut self) -> Result<(), RenderError> {
+        let everywhere =
+            self.options.all_planes || self.scene.settings.composite == Composite::Quotient;
+        self.run_pass(Pass::Real { everywhere }, &Cancel::new(&|| false, None))
+    }
+
+    /// Adds the film of another renderer of the same scene whose samples come just before or just after this one's, and traces what edge
+    /// pixels then lack. The result equals one render of both ranges within 2 units in the last place.
+    ///
+    /// # Errors
+    /// The films differ in size or planes, or their ranges leave a gap or overlap; nothing is changed then.
+    pub fn merge(&mut self, other: &Film) -> Result<(), RenderError> {
+        self.film.merge(other)?;
+        let end = self.film.first_sample + self.samples();
+        self.end_sample = self.end_sample.max(end);
+        self.replay_real()
     }
 
     /// Another lens. Nothing is rebuilt but the pilot; the film starts anew.
@@ -313,6 +350,14 @@ impl Renderer {
         Ok(())
     }
 
+    /// For tests: the graphics device, if one renders, is destroyed before its n-th batch from now.
+    #[doc(hidden)]
+    pub fn lose_device_after(&mut self, batches: u32) {
+        if let Backend::Gpu(gpu) = &mut self.backend {
+            gpu.lose_device_after(batches);
+        }
+    }
+
     fn run_pass(&mut self, pass: Pass, cancel: &Cancel) -> Result<(), RenderError> {
         if let Backend::Gpu(gpu) = &mut self.backend {
             match gpu.render_pass(&self.packed, &mut self.film, pass, cancel, &mut self.rays) {
@@ -340,7 +385,7 @@ impl Renderer {
         within_reach
             .map(|(sums, _)| sums.n)
             .min()
-            .unwrap_or(self.scene.settings.rays_per_pixel)
+            .unwrap_or(self.end_sample - self.film.first_sample)
     }
 
     pub fn film(&self) -> &Film {

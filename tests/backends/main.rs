@@ -1,0 +1,130 @@
+//! The two backends draw the same random numbers and do the same arithmetic: same samples, same film, up to rounding (invariant 7).
+
+mod agreement;
+mod assets;
+mod device;
+mod scenes;
+
+use mixray::gpu::{Features, harness::test_device};
+use mixray::packed::PackedScene;
+
+use agreement::{assert_agreement, assert_scene_agrees, load};
+use assets::shared_data;
+use scenes::{CASES, Case, case};
+
+macro_rules! each_case {
+    ($($name:ident,)*) => {
+        $(#[test]
+        fn $name() {
+            assert_agreement(case(stringify!($name)));
+        })*
+
+        const TESTED: &[&str] = &[$(stringify!($name),)*];
+    };
+}
+
+each_case! {
+    matt_under_a_flat_sky,
+    matt_with_an_occluder_under_a_quad,
+    textures_and_normal_maps_in_the_sun,
+    alpha_under_lights_without_size,
+    smooth_glass_in_the_sun,
+    rough_and_thin_glass,
+    clearcoat,
+    virtual_lights,
+    glowing_real_wall,
+    albedo_from_a_distorted_photograph,
+    mirrors_and_gloss,
+    paper_plain,
+    paper_with_everything,
+    direct_with_everything,
+}
+
+/// What the scenes between them use, and can do without.
+#[test]
+fn the_table_is_complete() {
+    let names: Vec<&str> = CASES.iter().map(|case| case.name).collect();
+    assert_eq!(names, TESTED);
+    let features: Vec<Features> = CASES
+        .iter()
+        .map(|case: &Case| {
+            Features::for_scene(&PackedScene::build(&load(&case.text())).expect("packs"))
+        })
+        .collect();
+    for (at, (flag, _)) in Features::default().flags().into_iter().enumerate() {
+        for wanted in [true, false] {
+            let found = features.iter().any(|f| f.flags()[at].1 == wanted);
+            assert!(found, "no scene has {flag} = {wanted}");
+        }
+    }
+    let text: String = CASES.iter().map(Case::text).collect();
+    for part in [
+        "jittered",
+        "cmj",
+        "\"square\"",
+        "aperture = 5",
+        "\"quotient\"",
+        "\"paper\"",
+        "from-photo",
+        "distortion",
+        "rotation_deg = 35",
+        "thin_walled",
+        "unlit",
+        "attenuation_color",
+        "max_bounces = 1",
+        "max_bounces = 2",
+        "max_bounces = 6",
+        "metallic = 1.0, roughness = 0.0",
+        "self_shadow_bias_m",
+        "exposure_ev",
+        "f_number",
+        "\"spot\"",
+        "\"directional\"",
+        "side = \"virtual\"",
+    ] {
+        assert!(text.contains(part), "no scene has {part}");
+    }
+}
+
+/// Models as they are found in the wild, under a studio map.
+#[test]
+fn models_of_others() {
+    let Some(gpu) = test_device() else { return };
+    let (Some(models), Some(maps)) = (shared_data("gltf_models"), shared_data("hdr_environments"))
+    else {
+        return;
+    };
+    let mut text = case("mirrors_and_gloss").text().replace(
+        "sky.hdr",
+        &maps.join("brown_photostudio_02_1k.hdr").to_string_lossy(),
+    );
+    for (model, place) in [
+        (
+            "DamagedHelmet.glb",
+            "scale = 0.3\ntranslation = [-0.3, 0.35, 0.4]",
+        ),
+        (
+            "ClearcoatTest.glb",
+            "scale = 0.04\ntranslation = [-0.5, 0.3, -0.3]",
+        ),
+        (
+            "IridescentDishWithOlives.glb",
+            "scale = 2.0\ntranslation = [0.35, 0.1, 0.6]",
+        ),
+        (
+            "AlphaBlendModeTest.glb",
+            "scale = 0.1\ntranslation = [0.3, 0.3, -0.3]",
+        ),
+        (
+            "TextureTransformTest/TextureTransformTest.gltf",
+            "scale = 0.15\ntranslation = [0, 0.8, 0]",
+        ),
+    ] {
+        let path = models.join(model);
+        text += &format!(
+            "\n[[virtual]]\nmesh = {:?}\n{place}\n",
+            path.to_string_lossy()
+        );
+    }
+    assert_scene_agrees(gpu, "models of others", &load(&text), true);
+}
