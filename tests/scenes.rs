@@ -48,6 +48,27 @@ fn every_scene_loads_without_warnings() {
 }
 
 #[test]
+fn the_readmes_scene_file_loads() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
+    let (_, after) = readme.split_once("```toml\n").unwrap();
+    let (text, _) = after.split_once("```").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let demo = root.join("scenes/demo");
+    for (from, to) in [
+        ("photo.png", "photo.png"),
+        ("env.exr", "env.exr"),
+        ("room.glb", "desk.glb"),
+    ] {
+        std::fs::copy(demo.join(from), folder.path().join(to)).unwrap();
+    }
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, text).unwrap();
+    let scene = scene::load(&path).unwrap();
+    assert_eq!((scene.objects.len(), scene.lights.len()), (2, 1));
+}
+
+#[test]
 fn the_demos_proxy_takes_its_colours_from_the_photograph() {
     let scene = load("demo");
     let mut real = scene.objects.iter().filter(|o| o.side == Side::Real);
