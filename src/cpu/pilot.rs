@@ -226,11 +226,12 @@ fn difference_period(scene: &PackedScene, beam: &Beam, lights: &PilotLights<'_>)
     };
     let mut importance =
         lights.reach_gain * cone_solid_angle_fraction(&scene.frame, position, normal);
-    if lights.uncertain
-        || lights
-            .examined
-            .iter()
-            .any(|l| light_may_be_blocked(&scene.frame, l, position))
+    if lights.uncertain {
+        importance = 1.0;
+    } else if lights
+        .examined
+        .iter()
+        .any(|l| light_may_be_blocked(&scene.frame, l, position))
     {
         importance = importance.max(LAMP_IMPORTANCE);
     }
