@@ -178,7 +178,7 @@ fn shaders_agree_with_their_twins() {
             rotation_deg: 0.0,
             scale: 1.0,
         });
-        std::mem::swap(&mut other.env_texels, &mut Vec::new());
+        other.env_texels = Vec::new();
         for light in &mut other.lights {
             light.radiance[0] *= 1.001;
         }
