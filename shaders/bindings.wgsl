@@ -142,7 +142,7 @@ const PIXEL_BEAM_MAY_MEET_VIRTUAL: u32 = 1u;
 const PIXEL_OUT_OF_REACH: u32 = 2u;
 
 struct PixelInfo {
-    difference_probability: f32,
+    difference_period: u32,
     flags: u32,
 }
 

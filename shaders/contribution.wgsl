@@ -4,7 +4,6 @@ import package::bindings::frame;
 import package::sampler::{SampleKey, sample_4d};
 import package::state::{DELTA_DENSITY, MODE_REAL, MODE_SHARED, PathState};
 
-const SET_PRIMARY_ROULETTE: u32 = 1u;
 const SET_DIFFERENCE_LIGHT: u32 = 0u;
 const SET_DIFFERENCE_BSDF: u32 = 1u;
 const SET_DIFFERENCE_CONE: u32 = 2u;

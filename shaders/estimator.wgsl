@@ -3,11 +3,11 @@
 import package::bindings::{NONE, frame, pixels, FRAME_AOVS, FRAME_ENV_DRAWN, PIXEL_BEAM_MAY_MEET_VIRTUAL};
 import package::bsdf::bsdf_albedo;
 import package::cones::cone_pdf;
-import package::contribution::{SET_PRIMARY_ROULETTE, accumulate, density_weight, sample_key};
+import package::contribution::{accumulate, density_weight, sample_key};
 import package::environment::env_radiance;
 import package::lens::camera_ray;
 import package::lights::env_pdf;
-import package::math::dot3;
+import package::math::{dot3, hash_combine, hash_u32};
 import package::sampler::sample_4d;
 import package::state::{
     COINCIDENCE, DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_REAL,
@@ -20,16 +20,41 @@ import package::surface::{Surface, surface_at};
 import package::trace::Hit;
 import package::vertex::shade_vertex;
 
+const TURN_SALT: u32 = 0x7f4a7c15u;
+
+fn difference_turn(pixel: u32, index: u32) -> u32 {
+    let period = pixels[pixel].difference_period;
+    if period <= 1u { return index; }
+    let offset = turn_offset(pixel, period);
+    if (index + offset) % period == period - 1u { return (index + offset) / period; }
+    return NONE;
+}
+
+fn turn_offset(pixel: u32, period: u32) -> u32 {
+    return hash_u32(hash_combine(frame.seed ^ TURN_SALT, pixel)) % period;
+}
+
 fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
     var st = path_state(pixel, index);
+    let may_meet_virtual = (pixels[pixel].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u;
+    st.rays.primary = select(1u, 0u, is_real_pass);
+    @if(!paper) {
+        if !is_real_pass && !may_meet_virtual {
+            let turn = difference_turn(pixel, index);
+            if turn != NONE {
+                st.index = turn;
+            } else if (frame.flags & FRAME_AOVS) == 0u {
+                return st;
+            }
+            primary_missed_virtual(&st, turn != NONE);
+        }
+    }
     let u = sample_4d(sample_key(&st), 0u);
     let x = f32(pixel % frame.width) + u.x;
     let y = f32(pixel / frame.width) + u.y;
     let ray = camera_ray(x, y, u.z, u.w);
     st.position = ray.origin;
     st.direction = ray.direction;
-    let may_meet_virtual = (pixels[pixel].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u;
-    st.rays.primary = select(1u, 0u, is_real_pass);
     if is_real_pass {
         st.stage = STAGE_REAL_PASS;
         st.request = select(REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_EACH, may_meet_virtual);
@@ -44,8 +69,6 @@ fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
         if may_meet_virtual {
             st.stage = STAGE_PRIMARY_VIRTUAL;
             st.request = REQUEST_CLOSEST_VIRTUAL;
-        } else {
-            primary_missed_virtual(&st);
         }
     }
     return st;
@@ -74,15 +97,10 @@ fn virtual_is_nearer(hit_virtual: Hit, hit_real: Hit) -> bool {
     return hit_real.triangle == NONE || hit_virtual.t <= hit_real.t * (1.0 + COINCIDENCE);
 }
 
-fn primary_missed_virtual(st: ptr<function, PathState>) {
-    let probability = pixels[(*st).pixel].difference_probability;
-    var survives = true;
-    if probability < 1.0 {
-        let u = sample_4d(sample_key(st), SET_PRIMARY_ROULETTE);
-        survives = u.x < probability;
-    }
-    (*st).throughput = vec3<f32>(select(0.0, 1.0 / probability, survives));
-    if survives || (frame.flags & FRAME_AOVS) != 0u {
+fn primary_missed_virtual(st: ptr<function, PathState>, has_turn: bool) {
+    let period = pixels[(*st).pixel].difference_period;
+    (*st).throughput = vec3<f32>(select(0.0, f32(period), has_turn));
+    if has_turn || (frame.flags & FRAME_AOVS) != 0u {
         (*st).stage = STAGE_PRIMARY_REAL;
         (*st).request = REQUEST_CLOSEST_REAL;
         (*st).hit_virtual = miss();
@@ -94,7 +112,7 @@ fn primary_missed_virtual(st: ptr<function, PathState>) {
 // False: the state already asks for its next ray, or is done.
 fn primary_virtual(st: ptr<function, PathState>) -> bool {
     if (*st).hit_virtual.triangle == NONE {
-        primary_missed_virtual(st);
+        primary_missed_virtual(st, difference_turn((*st).pixel, (*st).index) != NONE);
     } else {
         (*st).stage = STAGE_PRIMARY_REAL;
         (*st).request = REQUEST_CLOSEST_REAL;

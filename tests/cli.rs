@@ -337,3 +337,70 @@ fn ctrl_c_writes_the_picture_and_exits_with_130() {
     }
     panic!("the render never began");
 }
+
+/// A driver list that is not there hides every Vulkan device from the child.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_gpu_is_refused_where_there_is_none() {
+    let folder = Folder::new(&format!("{CAMERA}{VIRTUAL}"));
+    let without_driver = |backend: &str| {
+        let arguments = ["render", "scene.toml", "--rpp", "1", "--backend", backend];
+        command(folder.0.path(), &arguments)
+            .args(["-o", "a.png", "--stats", "s.json"])
+            .env("VK_DRIVER_FILES", "/nonexistent")
+            .env("VK_ICD_FILENAMES", "/nonexistent")
+            .output()
+            .unwrap()
+    };
+    assert_refused(&without_driver("gpu"), "no usable graphics device");
+    assert_eq!(folder.entries(), ["photo.png", "scene.toml"]);
+    // Negative control: `auto` takes the CPU instead.
+    let output = without_driver("auto");
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let stats = std::fs::read_to_string(folder.path("s.json")).unwrap();
+    assert!(stats.contains("\"backend\": \"cpu\""), "{stats}");
+}
+
+#[test]
+fn both_backends_write_the_same_picture_of_the_room() {
+    if mixray::gpu::harness::test_device().is_none() {
+        return;
+    }
+    let folder = Folder::new(CAMERA);
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/room/scene.toml");
+    let render = |backend: &str, seed: &str| {
+        let name = format!("{backend}{seed}.png");
+        let arguments = [
+            "render",
+            scene,
+            "--rpp",
+            "1",
+            "--backend",
+            backend,
+            "--seed",
+            seed,
+        ];
+        let output = command(folder.0.path(), &arguments)
+            .args(["-o", &name, "--stats", "s.json"])
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let stats = std::fs::read_to_string(folder.path("s.json")).unwrap();
+        assert!(
+            stats.contains(&format!("\"backend\": \"{backend}\"")),
+            "{stats}"
+        );
+        image::open(folder.path(&name)).unwrap().into_rgb8()
+    };
+    let expected = render("cpu", "0");
+    // Share of the pixels that are more than a code apart.
+    let apart = |picture: &image::RgbImage| {
+        let pairs = picture.pixels().zip(expected.pixels());
+        let far = pairs.filter(|(a, b)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 1));
+        far.count() as f64 / f64::from(expected.width() * expected.height())
+    };
+    let share = apart(&render("gpu", "0"));
+    assert!(share <= 1e-3, "{share}");
+    let control = apart(&render("gpu", "1"));
+    assert!(control > 0.02, "{control}");
+}

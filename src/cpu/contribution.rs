@@ -6,8 +6,7 @@ use super::state::*;
 use crate::camera::sampler::{SampleKey, sample_4d};
 use crate::packed::PackedScene;
 
-// Sample sets: 0 is pixel and lens, 1 the primary roulette, then six a depth from 8 on.
-pub const SET_PRIMARY_ROULETTE: u32 = 1;
+// Sample sets: 0 is pixel and lens, then six a depth from 8 on.
 pub const SET_DIFFERENCE_LIGHT: u32 = 0;
 pub const SET_DIFFERENCE_BSDF: u32 = 1;
 pub const SET_DIFFERENCE_CONE: u32 = 2;

@@ -16,18 +16,69 @@ use crate::light::cones::cone_pdf;
 use crate::light::environment::env_radiance;
 use crate::light::lights::env_pdf;
 use crate::material::{Surface, bsdf_albedo, surface_at};
+use crate::math::{hash_combine, hash_u32};
 use crate::packed::{FRAME_AOVS, FRAME_ENV_DRAWN, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene};
+
+/// Sets the turns' offset apart from the sampler's streams, which hash the same numbers.
+const TURN_SALT: u32 = 0x7f4a_7c15;
+
+/// The difference is evaluated in turns: at one sample in every `difference_period`, from a random offset of the pixel's own, so that each
+/// sample has the same chance. The number of the turn, or NONE if this sample has none.
+pub fn difference_turn(scene: &PackedScene, pixel: u32, index: u32) -> u32 {
+    let period = scene.pixels[pixel as usize].difference_period;
+    if period <= 1 {
+        return index;
+    }
+    let offset = turn_offset(scene, pixel, period);
+    if (index + offset) % period == period - 1 {
+        (index + offset) / period
+    } else {
+        NONE
+    }
+}
+
+fn turn_offset(scene: &PackedScene, pixel: u32, period: u32) -> u32 {
+    hash_u32(hash_combine(scene.frame.seed ^ TURN_SALT, pixel)) % period
+}
+
+/// How many samples of the pixel, from `index` on and before `end`, are known to add nothing before their ray is even made.
+pub fn samples_without_turn(scene: &PackedScene, pixel: u32, index: u32, end: u32) -> u32 {
+    let info = &scene.pixels[pixel as usize];
+    if info.difference_period <= 1
+        || info.flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0
+        || scene.frame.estimator == ESTIMATOR_PAPER
+        || scene.frame.flags & FRAME_AOVS != 0
+    {
+        return 0;
+    }
+    let period = info.difference_period;
+    let in_period = (index + turn_offset(scene, pixel, period)) % period;
+    (period - 1 - in_period).min(end - index)
+}
 
 /// Sets up the primary ray. `real_pass` renders the real radiance and the mask alone, for pixels that need Ir.
 pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool) -> PathState {
     let mut st = PathState::new(pixel, index);
+    let may_meet_virtual = scene.pixels[pixel as usize].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0;
+    let direct = !real_pass && scene.frame.estimator != ESTIMATOR_PAPER;
+    // A replayed sample's primary ray was counted when it was first taken.
+    st.rays.primary = u32::from(!real_pass);
+    if direct && !may_meet_virtual {
+        // The samples that have a turn are numbered by it, and so are spread over the pixel and the lens as a set of their own.
+        let turn = difference_turn(scene, pixel, index);
+        if turn != NONE {
+            st.index = turn;
+        } else if scene.frame.flags & FRAME_AOVS == 0 {
+            return st;
+        }
+        primary_missed_virtual(scene, &mut st, turn != NONE);
+    }
     let u = sample_4d(sample_key(scene, &st), 0);
     let x = (pixel % scene.frame.width) as f32 + u[0];
     let y = (pixel / scene.frame.width) as f32 + u[1];
     let ray = camera_ray(&scene.frame, x, y, u[2], u[3]);
     st.position = ray.origin;
     st.direction = ray.direction;
-    let may_meet_virtual = scene.pixels[pixel as usize].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0;
     if real_pass {
         st.stage = STAGE_REAL_PASS;
         st.request = if may_meet_virtual {
@@ -42,11 +93,7 @@ pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool
     } else if may_meet_virtual {
         st.stage = STAGE_PRIMARY_VIRTUAL;
         st.request = REQUEST_CLOSEST_VIRTUAL;
-    } else {
-        primary_missed_virtual(scene, &mut st);
     }
-    // A replayed sample's primary ray was counted when it was first taken.
-    st.rays.primary = u32::from(!real_pass);
     st
 }
 
@@ -75,20 +122,11 @@ fn virtual_is_nearer(hit_virtual: Hit, hit_real: Hit) -> bool {
     hit_virtual.triangle != NONE && hit_virtual.t <= hit_real.t * (1.0 + COINCIDENCE)
 }
 
-/// The beam met nothing virtual: the difference is evaluated with the pixel's probability, before the real ray is paid for.
-fn primary_missed_virtual(scene: &PackedScene, st: &mut PathState) {
-    let probability = scene.pixels[st.pixel as usize].difference_probability;
-    let mut survives = true;
-    if probability < 1.0 {
-        let u = sample_4d(sample_key(scene, st), SET_PRIMARY_ROULETTE);
-        survives = u[0] < probability;
-    }
-    st.throughput = if survives {
-        Vec3::splat(1.0 / probability)
-    } else {
-        Vec3::ZERO
-    };
-    if survives || scene.frame.flags & FRAME_AOVS != 0 {
+/// Nothing virtual was met: the difference is evaluated if the sample has a turn, before the real ray is paid for.
+fn primary_missed_virtual(scene: &PackedScene, st: &mut PathState, has_turn: bool) {
+    let period = scene.pixels[st.pixel as usize].difference_period;
+    st.throughput = Vec3::splat(if has_turn { period as f32 } else { 0.0 });
+    if has_turn || scene.frame.flags & FRAME_AOVS != 0 {
         st.stage = STAGE_PRIMARY_REAL;
         st.request = REQUEST_CLOSEST_REAL;
         st.hit_virtual = MISS;
@@ -100,7 +138,8 @@ fn primary_missed_virtual(scene: &PackedScene, st: &mut PathState) {
 /// False: the state already asks for its next ray, or is done.
 fn primary_virtual(scene: &PackedScene, st: &mut PathState) -> bool {
     if st.hit_virtual.triangle == NONE {
-        primary_missed_virtual(scene, st);
+        let has_turn = difference_turn(scene, st.pixel, st.index) != NONE;
+        primary_missed_virtual(scene, st, has_turn);
     } else {
         st.stage = STAGE_PRIMARY_REAL;
         st.request = REQUEST_CLOSEST_REAL;
@@ -116,7 +155,7 @@ fn primary_real(st: &mut PathState) {
         st.mode = MODE_MIXED;
         plan_vertex(st, st.hit_virtual);
     } else if st.hit_real.triangle != NONE {
-        // Without throughput the roulette has ended the sample, and the vertex only fills the planes.
+        // Without throughput the sample has no turn, and the vertex only fills the planes.
         st.mode = MODE_DIFFERENCE;
         plan_vertex(st, st.hit_real);
     }

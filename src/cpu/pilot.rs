@@ -1,7 +1,7 @@
 //! One look at every pixel before the first sample: which beams can meet virtual geometry, which pixels nothing virtual can reach, and with
-//! what probability a sample is worth the evaluation of its difference.
+//! what share of the samples is worth the evaluation of its difference.
 //!
-//! The probabilities steer work, not the result: a sample that survives is divided by its probability. The two flags are proven.
+//! The shares steer work, not the result: a sample that is evaluated counts for those that are not. The two flags are proven.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -18,14 +18,17 @@ use crate::packed::{
 };
 
 /// Share of the sky (cosine-weighted) covered by virtual geometry from which on every sample is evaluated.
-const REACH_GAIN: f32 = 16.0;
-/// Smallest probability: far from everything one sample in this many is evaluated.
-const PROBABILITY_FLOOR: f32 = 1.0 / 16.0;
+const REACH_GAIN: f32 = 2.0;
+/// Far from everything one sample in this many is evaluated.
+const LONGEST_PERIOD: f32 = 64.0;
+/// Importance of a point whose light from a lamp something virtual may block, and per share of the environment's light that may be blocked.
+const LAMP_IMPORTANCE: f32 = 0.25;
+const ENVIRONMENT_GAIN: f32 = 1.0;
 /// Environment directions tried per pixel for blocked light.
 const ENVIRONMENT_TRIALS: u32 = 16;
 /// Lights examined per pixel; scenes with more get certainty instead of an estimate.
 const MAX_LIGHTS_EXAMINED: usize = 32;
-/// The probability map is widened by this many pixels, so that a lens beam does not jump off it at an edge.
+/// The map of periods is widened by this many pixels, so that a lens beam does not jump off it at an edge.
 const DILATION_PX: usize = 2;
 
 /// Fills one [`PixelInfo`] a pixel. Costs one real ray a pixel at most.
@@ -37,7 +40,7 @@ pub fn pilot(scene: &PackedScene) -> Vec<PixelInfo> {
     if nothing_virtual {
         return vec![
             PixelInfo {
-                difference_probability: 1.0,
+                difference_period: 1,
                 flags: PIXEL_OUT_OF_REACH
             };
             width * height
@@ -59,7 +62,7 @@ pub fn pilot(scene: &PackedScene) -> Vec<PixelInfo> {
             };
             let out_of_reach = flags == 0 && !beam.may_meet_real(scene);
             PixelInfo {
-                difference_probability: difference_probability(scene, &beam, &lights),
+                difference_period: difference_period(scene, &beam, &lights),
                 flags: flags | if out_of_reach { PIXEL_OUT_OF_REACH } else { 0 },
             }
         })
@@ -196,7 +199,7 @@ fn environment_directions(scene: &PackedScene) -> Vec<Vec3> {
         .collect()
 }
 
-fn difference_probability(scene: &PackedScene, beam: &Beam, lights: &PilotLights<'_>) -> f32 {
+fn difference_period(scene: &PackedScene, beam: &Beam, lights: &PilotLights<'_>) -> u32 {
     let ray = Ray {
         origin: beam.origin,
         direction: beam.direction,
@@ -206,7 +209,7 @@ fn difference_probability(scene: &PackedScene, beam: &Beam, lights: &PilotLights
     };
     let hit = scene.real_bvh.closest(&ray);
     if hit.triangle == NONE {
-        return PROBABILITY_FLOOR;
+        return LONGEST_PERIOD as u32;
     }
     let position = beam.origin + beam.direction * hit.t;
     let corners = scene.triangles[hit.triangle as usize].vertices.map(|v| {
@@ -229,15 +232,15 @@ fn difference_probability(scene: &PackedScene, beam: &Beam, lights: &PilotLights
             .iter()
             .any(|l| light_may_be_blocked(&scene.frame, l, position))
     {
-        importance = 1.0;
+        importance = importance.max(LAMP_IMPORTANCE);
     }
     let blocked = lights
         .directions
         .iter()
         .filter(|&&d| d.dot(normal) > 0.0 && direction_meets_spheres(&scene.frame, position, d))
         .count();
-    importance += 4.0 * blocked as f32 / ENVIRONMENT_TRIALS as f32;
-    importance.clamp(PROBABILITY_FLOOR, 1.0)
+    importance += ENVIRONMENT_GAIN * blocked as f32 / ENVIRONMENT_TRIALS as f32;
+    (1.0 / importance).clamp(1.0, LONGEST_PERIOD).round() as u32
 }
 
 /// Whether something virtual may stand between the point and a light other than the environment.
@@ -272,7 +275,7 @@ fn light_may_be_blocked(frame: &Frame, light: &Light, position: Vec3) -> bool {
         })
 }
 
-/// Largest probability of the neighbourhood, separably.
+/// Shortest period of the neighbourhood, separably.
 fn dilate(pixels: &mut [PixelInfo], width: usize, height: usize) {
     let pass = |pixels: &mut [PixelInfo],
                 count: usize,
@@ -281,14 +284,13 @@ fn dilate(pixels: &mut [PixelInfo], width: usize, height: usize) {
                 line_stride: usize| {
         for line in 0..lines {
             let at = |i: usize| line * line_stride + i * stride;
-            let values: Vec<f32> = (0..count)
-                .map(|i| pixels[at(i)].difference_probability)
+            let values: Vec<u32> = (0..count)
+                .map(|i| pixels[at(i)].difference_period)
                 .collect();
             for i in 0..count {
                 let window =
                     &values[i.saturating_sub(DILATION_PX)..(i + DILATION_PX + 1).min(count)];
-                pixels[at(i)].difference_probability =
-                    window.iter().fold(0.0, |a: f32, &b| a.max(b));
+                pixels[at(i)].difference_period = window.iter().fold(u32::MAX, |a, &b| a.min(b));
             }
         }
     };

@@ -6,7 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::contribution::ESTIMATOR_PAPER;
-use super::estimator::{advance, begin_sample};
+use super::estimator::{advance, begin_sample, samples_without_turn};
 use super::state::{PathState, RayCounts, STAGE_DONE};
 use super::trace::answer;
 use crate::film::{Film, Guide, GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
@@ -57,19 +57,19 @@ pub fn render_pass(scene: &PackedScene, film: &mut Film, pass: Pass, cancel: &Ca
                             continue;
                         }
                         while first_sample + sums.n < end {
+                            let index = first_sample + sums.n;
+                            let idle = samples_without_turn(scene, pixel as u32, index, end);
+                            if idle > 0 {
+                                sums.add_nothing(idle);
+                                counts.kinds[0] += u64::from(idle);
+                                continue;
+                            }
                             let guide = if with_guides {
                                 Some(&mut guides[i])
                             } else {
                                 None
                             };
-                            main_sample(
-                                scene,
-                                pixel as u32,
-                                first_sample + sums.n,
-                                sums,
-                                guide,
-                                &mut counts,
-                            );
+                            main_sample(scene, pixel as u32, index, sums, guide, &mut counts);
                         }
                     }
                     Pass::Real { .. } => {

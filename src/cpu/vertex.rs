@@ -29,7 +29,7 @@ const SHADOW_SHORTEN: f32 = 2e-5;
 const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
 /// Lights drawn at the first difference vertex, of which one is traced: most directions meet nothing virtual and cost no ray.
-const DIFFERENCE_LIGHTS: u32 = 4;
+const DIFFERENCE_LIGHTS: u32 = 2;
 /// Surfaces that scatter nothing.
 const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
 

@@ -137,6 +137,11 @@ impl PixelSums {
         }
     }
 
+    /// Adds `count` samples of the main pass that met nothing virtual and bring no difference.
+    pub fn add_nothing(&mut self, count: u32) {
+        self.n += count;
+    }
+
     /// Adds the sums of later samples of the same pixel.
     pub(super) fn merge(&mut self, later: &Self) {
         let real_kept_up = self.n_real == self.n;

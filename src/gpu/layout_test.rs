@@ -130,7 +130,7 @@ fn host() -> Vec<(&'static str, u32, Fields)> {
             pad,
         }),
         host_fields!(PixelInfo {
-            difference_probability,
+            difference_period,
             flags
         }),
     ]

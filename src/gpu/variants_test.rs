@@ -77,17 +77,223 @@ fn kernels_bind_what_they_use_and_no_more() {
     );
 }
 
+/// What a feature puts into a kernel, and what goes with it: declarations and expressions of the emitted code.
+struct Trace {
+    feature: &'static str,
+    kernel: &'static str,
+    /// There with the feature, and only then.
+    with: &'static [&'static str],
+    /// There without the feature, and only then.
+    without: &'static [&'static str],
+    /// The features that the code needs beside this one.
+    beside: &'static [&'static str],
+}
+
+const ADVANCE: Trace = Trace {
+    feature: "",
+    kernel: "kernel_advance",
+    with: &[],
+    without: &[],
+    beside: &[],
+};
+
+/// Every feature of [`Features`] at least once.
+const TRACES: &[Trace] = &[
+    Trace {
+        feature: "textures",
+        with: &[
+            "bindings_texels",
+            "fn texture_slot",
+            "fn texture_texture_sample",
+        ],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "alpha",
+        with: &["fn surface_coverage_of"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "alpha",
+        kernel: "kernel_trace",
+        with: &[
+            "bindings_materials",
+            "bindings_vertices",
+            "fn request_meets",
+            "fn surface_surface_alpha",
+        ],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "transmission",
+        with: &[".sigma_a", "fn math_exp_"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "transmission",
+        with: &[
+            "fn bsdf_eval_transmission",
+            "fn bsdf_transmit_straight",
+            "fn ggx_ggx_refract",
+            "fn fresnel_refract_about",
+        ],
+        beside: &["rough_specular"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "clearcoat",
+        with: &["fn bsdf_sample_coat"],
+        beside: &["rough_specular"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "clearcoat",
+        with: &[".clearcoat_texture", ".clearcoat_normal_texture"],
+        beside: &["rough_specular", "textures", "normal_maps"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "environment_map",
+        with: &[
+            "bindings_env_cdf",
+            "bindings_env_texels",
+            "fn environment_env_sample_map",
+            "fn environment_find_interval",
+        ],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "area_lights",
+        with: &[
+            "fn lights_sample_area_light",
+            "fn lights_light_pdf_hit",
+            "fn rectangle_",
+            "fn surface_triangle_emission",
+        ],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "delta_lights",
+        with: &["fn lights_sample_point_light", "fn lights_spot_falloff"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "lens",
+        kernel: "kernel_generate",
+        with: &[
+            "fn lens_sample_lens",
+            "bindings_frame.aperture_radius",
+            "bindings_frame.inv_focus_distance",
+        ],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "multi_bounce",
+        with: &["vertex_ROULETTE_GAIN", "vertex_ROULETTE_FROM_DEPTH"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "photo_albedo",
+        with: &["bindings_photo_albedo", "fn surface_photo_albedo_at"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "normal_maps",
+        with: &[
+            "fn surface_perturbed",
+            "fn normal_mapped_normal",
+            "fn normal_tangent_from_uv",
+        ],
+        beside: &["textures"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "paper",
+        with: &["fn estimator_paper_behind", ".radiance_real"],
+        without: &[
+            "fn estimator_primary_virtual",
+            "fn estimator_difference_shadow",
+            "fn estimator_difference_cone",
+            "fn estimator_difference_bsdf",
+            "fn estimator_split_difference",
+            "fn vertex_plan_cone",
+            "fn cones_",
+        ],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "paper",
+        kernel: "kernel_accumulate",
+        with: &[".radiance_real"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "rough_specular",
+        with: &[
+            "fn ggx_",
+            "fn bsdf_sample_layers",
+            "fn bsdf_eval_reflection",
+            "fn normal_valid_shading_normal",
+        ],
+        ..ADVANCE
+    },
+];
+
 #[test]
-fn a_specialised_kernel_lacks_the_other_estimator() {
-    let accumulate = |paper| {
+fn a_feature_brings_its_code_and_leaves_with_it() {
+    let composer = Composer::default();
+    for (feature, _) in Features::default().flags() {
+        assert!(
+            TRACES.iter().any(|trace| trace.feature == feature),
+            "{feature} leaves no trace"
+        );
+    }
+    for trace in TRACES {
+        let mut off = Features::default();
+        for name in trace.beside {
+            off = off.toggled(name);
+        }
+        let on = off.toggled(trace.feature);
+        assert_ne!(on, off, "there is no feature {}", trace.feature);
+        let code = [on, off, Features::all().toggled(trace.feature)]
+            .map(|features| valid(&composer, trace.kernel, &features));
+        let [on, off, all_but] = &code;
+        for (parts, there, gone) in [(trace.with, on, off), (trace.without, off, on)] {
+            for part in parts {
+                assert!(
+                    there.contains(part),
+                    "{}: {part} is not there",
+                    trace.feature
+                );
+                assert!(!gone.contains(part), "{}: {part} is there", trace.feature);
+            }
+        }
+        for part in trace.with {
+            assert!(
+                !all_but.contains(part),
+                "everything but {}: {part} is there",
+                trace.feature
+            );
+        }
+    }
+}
+
+/// At max_bounces 1 the difference at a real point behind a real point is never asked for: one call plans a vertex less.
+#[test]
+fn one_bounce_has_no_recursion() {
+    let plans = |multi_bounce| {
         let features = Features {
-            paper,
+            multi_bounce,
             ..Features::default()
         };
-        valid(&Composer::default(), "kernel_accumulate", &features)
+        let wgsl = valid(&Composer::default(), "kernel_advance", &features);
+        let (_, rest) = wgsl
+            .split_once("fn estimator_difference_bsdf")
+            .expect("is there");
+        let (body, _) = rest.split_once("\nfn ").unwrap_or((rest, ""));
+        body.matches("estimator_plan_vertex(").count()
     };
-    assert!(accumulate(true).contains(".radiance_real"));
-    assert!(!accumulate(false).contains(".radiance_real"));
+    assert_eq!((plans(true), plans(false)), (1, 0));
 }
 
 #[test]

@@ -314,7 +314,7 @@ fn a_pass_asks_for_what_each_pixel_lacks() {
         film.add(2, &sample(false));
     }
     let mut pixels = [PixelInfo {
-        difference_probability: 1.0,
+        difference_period: 1,
         flags: 0,
     }; 4];
     pixels[3].flags = PIXEL_OUT_OF_REACH;

@@ -109,7 +109,7 @@ impl PackedScene {
         let count = scene.camera.width as usize * scene.camera.height as usize;
         self.pixels = vec![
             PixelInfo {
-                difference_probability: 1.0,
+                difference_period: 1,
                 flags: PIXEL_BEAM_MAY_MEET_VIRTUAL
             };
             count

@@ -212,7 +212,7 @@ pub const PIXEL_OUT_OF_REACH: u32 = 2;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct PixelInfo {
-    /// Probability in (0, 1] with which a sample that misses virtual geometry evaluates its difference.
-    pub difference_probability: f32,
+    /// Of the samples that miss virtual geometry one in this many, at least 1, evaluates its difference.
+    pub difference_period: u32,
     pub flags: u32,
 }

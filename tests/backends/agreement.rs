@@ -1,6 +1,5 @@
 //! Invariant 7 in numbers: 99.9% of the pixels within 1e-4 relative + 1e-5, the averages within 1e-5, every outlier a flipped decision.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use mixray::cpu::render::render_pass;
@@ -21,11 +20,7 @@ const OUTLIERS: f64 = 1e-3;
 pub fn load(text: &str) -> Scene {
     let folder = tempfile::tempdir().expect("folder");
     write_assets(folder.path());
-    load_in(folder.path(), text)
-}
-
-pub fn load_in(folder: &Path, text: &str) -> Scene {
-    let path = folder.join("scene.toml");
+    let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).expect("writes");
     mixray::scene::load(&path).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -68,7 +63,8 @@ pub struct Difference {
     /// Pixels with a value that is too far off.
     pub outliers: Vec<usize>,
     pub pixels: usize,
-    /// The largest relative difference of a plane's average, outliers left out; planes that average to nearly nothing do not count.
+    /// The largest relative difference of a plane's average. Outliers are left out: of so few samples a flipped one moves it further.
+    /// A plane that averages to nothing counts by its absolute difference.
     pub average: f64,
 }
 
@@ -177,7 +173,7 @@ pub fn assert_scene_agrees(gpu: &Arc<GpuDevice>, name: &str, scene: &Scene, all_
     assert!((gpu_total / cpu_total - 1.0).abs() < 1e-3, "{name}");
     assert_eq!(cpu_rays.primary, gpu_rays.primary, "{name}");
 
-    // Negative controls: other random numbers, and materials of which one is 1% brighter.
+    // Negative controls: other random numbers, and materials 1% brighter.
     let mut seeded = scene.clone();
     seeded.settings.seed += 1;
     let mut brighter = scene.clone();
@@ -197,7 +193,7 @@ pub fn assert_scene_agrees(gpu: &Arc<GpuDevice>, name: &str, scene: &Scene, all_
     }
 }
 
-/// A virtual object's colours, 1% brighter (or darker, where they are white).
+/// Every colour 1% brighter (or darker, where it is white).
 fn brighten(scene: &mut Scene) {
     for object in &mut scene.objects {
         for instance in &mut object.instances {

@@ -35,10 +35,7 @@ fn in_portions(backend: &mut GpuBackend, renderer: &Renderer, ends: &[u32]) -> (
 #[test]
 fn a_film_does_not_depend_on_how_the_work_is_cut() {
     let Some(gpu) = test_device() else { return };
-    let built = renderer(
-        load(&case("matt_with_an_occluder_under_a_quad").text()),
-        true,
-    );
+    let built = renderer(load(&case("matt_under_a_flat_sky").text()), true);
     let mut backend = backend_for(gpu, &built);
     let (film, rays) = gpu_film(&mut backend, &built, true);
     for ends in [&[1, 2, 3, 4, 5, RAYS][..], &[1, 5, RAYS]] {
@@ -56,7 +53,7 @@ fn a_lost_device_is_replaced_by_the_cpu_with_what_was_accumulated() {
     if test_device().is_none() {
         return;
     }
-    let mut scene = load(&case("matt_with_an_occluder_under_a_quad").text());
+    let mut scene = load(&case("matt_under_a_flat_sky").text());
     let mut reference = renderer(scene.clone(), true);
     complete(&mut reference);
     let expected = planes(&reference, reference.film());

@@ -8,7 +8,7 @@ mod scenes;
 use mixray::gpu::{Features, harness::test_device};
 use mixray::packed::PackedScene;
 
-use agreement::{assert_agreement, assert_scene_agrees, load, load_in};
+use agreement::{assert_agreement, assert_scene_agrees, load};
 use assets::shared_data;
 use scenes::{CASES, Case, case};
 
@@ -94,39 +94,37 @@ fn models_of_others() {
     else {
         return;
     };
-    for (model, placement) in [
+    let mut text = case("mirrors_and_gloss").text().replace(
+        "sky.hdr",
+        &maps.join("brown_photostudio_02_1k.hdr").to_string_lossy(),
+    );
+    for (model, place) in [
         (
             "DamagedHelmet.glb",
-            "scale = 0.35\ntranslation = [0, 0.4, 0]",
+            "scale = 0.3\ntranslation = [-0.3, 0.35, 0.4]",
         ),
         (
             "ClearcoatTest.glb",
-            "scale = 0.06\ntranslation = [0, 0.3, 0]",
+            "scale = 0.04\ntranslation = [-0.5, 0.3, -0.3]",
         ),
         (
             "IridescentDishWithOlives.glb",
-            "scale = 2.0\ntranslation = [0, 0.1, 0]",
-        ),
-        (
-            "TextureTransformTest/TextureTransformTest.gltf",
-            "scale = 0.25\ntranslation = [0, 0.3, 0]",
+            "scale = 2.0\ntranslation = [0.35, 0.1, 0.6]",
         ),
         (
             "AlphaBlendModeTest.glb",
-            "scale = 0.12\ntranslation = [0, 0.1, 0]",
+            "scale = 0.1\ntranslation = [0.3, 0.3, -0.3]",
+        ),
+        (
+            "TextureTransformTest/TextureTransformTest.gltf",
+            "scale = 0.15\ntranslation = [0, 0.8, 0]",
         ),
     ] {
-        let text = case("mirrors_and_gloss").text();
-        let (camera, rest) = text.split_once("[environment]").expect("has a map");
-        let (_, floor) = rest.split_once("[[real]]").expect("has a floor");
-        let (floor, _) = floor.split_once("[[virtual]]").expect("has objects");
-        let text = format!(
-            "{camera}[environment]\nimage = {:?}\n[[real]]{floor}[[virtual]]\nmesh = {:?}\n{placement}\n[render]\nrays_per_pixel = {}\nbackend = \"cpu\"\nmax_bounces = 3\n",
-            maps.join("brown_photostudio_02_1k.hdr"),
-            models.join(model),
-            scenes::RAYS,
+        let path = models.join(model);
+        text += &format!(
+            "\n[[virtual]]\nmesh = {:?}\n{place}\n",
+            path.to_string_lossy()
         );
-        let folder = tempfile::tempdir().expect("folder");
-        assert_scene_agrees(gpu, model, &load_in(folder.path(), &text), true);
     }
+    assert_scene_agrees(gpu, "models of others", &load(&text), true);
 }

@@ -37,13 +37,13 @@ fn the_shortest_scene_has_the_stated_defaults() {
         Settings {
             rays_per_pixel: 49,
             max_bounces: 4,
+            clamp_indirect: f32::INFINITY,
             seed: 0,
             estimator: Estimator::Direct,
             sampler: SamplerKind::Sobol,
             composite: Composite::Additive,
             backend: BackendChoice::Auto,
             exposure: Exposure::Ev(0.0),
-            clamp_indirect: f32::INFINITY,
         }
     );
 }
@@ -263,19 +263,19 @@ fn a_proxy_without_material_takes_the_photographs_or_grey() {
 #[test]
 fn settings_and_flags() {
     let mut settings = load_with_camera(
-        "[render]\nrays_per_pixel = 9\nmax_bounces = 1\nseed = 4294967295\nestimator = \"paper\"\nsampler = \"jittered\"\ncomposite = \"quotient\"\nbackend = \"cpu\"\n[photo]\nexposure_ev = -1\n",
+        "[render]\nrays_per_pixel = 9\nmax_bounces = 1\nclamp_indirect = 2.5\nseed = 4294967295\nestimator = \"paper\"\nsampler = \"jittered\"\ncomposite = \"quotient\"\nbackend = \"cpu\"\n[photo]\nexposure_ev = -1\n",
     )
     .settings;
     let from_file = Settings {
         rays_per_pixel: 9,
         max_bounces: 1,
+        clamp_indirect: 2.5,
         seed: u32::MAX,
         estimator: Estimator::Paper,
         sampler: SamplerKind::Jittered,
         composite: Composite::Quotient,
         backend: BackendChoice::Cpu,
         exposure: Exposure::Ev(-1.0),
-        clamp_indirect: f32::INFINITY,
     };
     assert_eq!(settings, from_file);
     settings.apply(&Overrides::default());
