@@ -75,7 +75,7 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     @if(!paper) {
         if difference {
             let strength = max_element(abs((*st).throughput * bsdf_albedo(s, wo)));
-            let reach = cone_solid_angle_fraction(s.position, s.ng);
+            let reach = cone_solid_angle_fraction(s.position, s.ns);
             roulette.cone = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
             if bsdf_is_lambertian(s) {
                 roulette.bsdf = clamp(RECURSION_ROULETTE_GAIN * strength, RECURSION_ROULETTE_FLOOR, 1.0);
@@ -151,7 +151,7 @@ fn light_contribution(
         var other = f.pdf;
         @if(!paper) {
             if difference {
-                other = roulette.cone * cone_pdf(s.position, s.ng, l.direction);
+                other = roulette.cone * cone_pdf(s.position, s.ns, l.direction);
                 if !bsdf_is_lambertian(s) { other += f.pdf; }
             }
         }
@@ -181,7 +181,7 @@ fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample) {
 fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
     let u = draw(st, SET_DIFFERENCE_CONE);
     if frame.sphere_count == 0u || u.w >= roulette.cone { return; }
-    let c = cone_sample(s.position, s.ng, u.xyz);
+    let c = cone_sample(s.position, s.ns, u.xyz);
     if c.pdf <= 0.0 { return; }
     let f = bsdf_eval(s, wo, c.direction);
     if max_element(f.f_cos) <= 0.0 { return; }
@@ -222,7 +222,7 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, ro
             (*st).difference_depth = (*st).depth;
             (*st).difference_direction = b.wi;
             (*st).difference_lambertian = u32(bsdf_is_lambertian(s));
-            (*st).difference_normal = s.ng;
+            (*st).difference_normal = s.ns;
             (*st).difference_cone_probability = roulette.cone / f32(light_draws(st));
             (*st).difference_density = select(b.pdf / f32(light_draws(st)), DELTA_DENSITY, b.delta);
             (*st).difference_throughput = throughput * (1.0 / roulette.bsdf);

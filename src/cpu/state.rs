@@ -158,7 +158,7 @@ pub struct PathState {
     pub difference_medium: u32,
     /// The vertex is Lambertian: what the cones cover is left to them.
     pub difference_lambertian: bool,
-    /// Geometric normal and roulette probability of the cones (over the number of lights drawn) at that vertex, to weigh a BSDF direction
+    /// Shading normal and roulette probability of the cones (over the number of lights drawn) at that vertex, to weigh a BSDF direction
     /// against them.
     pub difference_normal: Vec3,
     pub difference_cone_probability: f32,

@@ -86,7 +86,7 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     };
     if difference {
         let strength = (st.throughput * bsdf_albedo(s, wo)).abs().max_element();
-        let reach = cone_solid_angle_fraction(&scene.frame, s.position, s.ng);
+        let reach = cone_solid_angle_fraction(&scene.frame, s.position, s.ns);
         roulette.cone = (CONE_ROULETTE_GAIN * strength * reach).clamp(CONE_ROULETTE_FLOOR, 1.0);
         if bsdf_is_lambertian(s) {
             roulette.bsdf =
@@ -198,7 +198,7 @@ fn light_contribution(
     if !l.delta {
         let mut other = f.pdf;
         if difference {
-            other = roulette.cone * cone_pdf(&scene.frame, s.position, s.ng, l.direction);
+            other = roulette.cone * cone_pdf(&scene.frame, s.position, s.ns, l.direction);
             if !bsdf_is_lambertian(s) {
                 other += f.pdf;
             }
@@ -226,14 +226,14 @@ fn plan_shadow(st: &mut PathState, s: &Surface, l: &LightSample) {
     st.pending |= PENDING_SHADOW;
 }
 
-/// (b): a direction inside the cones of the virtual bounding spheres, above the geometric horizon: smooth shading normals scatter light
-/// from everywhere above it.
+/// (b): a direction inside the cones of the virtual bounding spheres. Those about the shading normal leave nothing out: Lambert's mirrored
+/// cosine is 0 under its horizon.
 fn plan_cone(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, roulette: Roulette) {
     let u = draw(scene, st, SET_DIFFERENCE_CONE);
     if scene.frame.sphere_count == 0 || u[3] >= roulette.cone {
         return;
     }
-    let c = cone_sample(&scene.frame, s.position, s.ng, [u[0], u[1], u[2]]);
+    let c = cone_sample(&scene.frame, s.position, s.ns, [u[0], u[1], u[2]]);
     if c.pdf <= 0.0 {
         return;
     }
@@ -299,7 +299,7 @@ fn plan_continuation(
         st.difference_depth = st.depth;
         st.difference_direction = b.wi;
         st.difference_lambertian = bsdf_is_lambertian(s);
-        st.difference_normal = s.ng;
+        st.difference_normal = s.ns;
         st.difference_cone_probability = roulette.cone / light_draws(st) as f32;
         st.difference_density = if b.delta {
             DELTA_DENSITY

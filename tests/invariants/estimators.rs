@@ -261,7 +261,7 @@ material = { base_color = [0.8, 0.8, 0.8], specular = 0.0 }
     agree("coarse smooth glossy ball", &scene, &[1, 2], backend);
 }
 
-/// Shading normals far from the geometric one: light from under the shading horizon counts too.
+/// Shading normals far from the geometric one, where Lambert's cosine is mirrored up at the surface.
 fn tilted_normals(backend: BackendChoice) {
     let mut scene = room(&format!("{TABLE}{LAMP}{SKY}{RED_BOX}"));
     for object in scene.objects.iter_mut().filter(|o| o.name == "table") {
