@@ -49,9 +49,9 @@ def write_scene(peer, folder):
     return path
 
 
-def render(scene_path, *, rays_per_pixel, seed, estimator="direct", sampler="sobol", backend="cpu"):
-    """(layers of the EXR by channel name, statistics)."""
-    image, stats = scene_path.with_name("out.exr"), scene_path.with_name("stats.json")
+def render(scene_path, *, rays_per_pixel, seed, estimator="direct", sampler="sobol", backend="cpu", picture="out.exr"):
+    """(layers of the EXR by channel name, statistics). A PNG has no layers and spares the real radiance that they need."""
+    image, stats = scene_path.with_name(picture), scene_path.with_name("stats.json")
     arguments = {
         "--rpp": rays_per_pixel,
         "--seed": seed,
@@ -63,6 +63,8 @@ def render(scene_path, *, rays_per_pixel, seed, estimator="direct", sampler="sob
     }
     command = [BINARY, "render", scene_path, *(str(x) for pair in arguments.items() for x in pair)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    if image.suffix != ".exr":
+        return {}, json.loads(stats.read_text())
     bitmap = mi.Bitmap(str(image))
     names = [field.name for field in bitmap.struct_()]
     planes = np.array(bitmap, np.float64)

@@ -18,12 +18,12 @@ use crate::packed::{
 };
 
 /// Share of the sky (cosine-weighted) covered by virtual geometry from which on every sample is evaluated.
-const REACH_GAIN: f32 = 2.0;
+const REACH_GAIN: f32 = 4.0;
 /// Far from everything one sample in this many is evaluated.
-const LONGEST_PERIOD: f32 = 64.0;
+const LONGEST_PERIOD: f32 = 16.0;
 /// Importance of a point whose light from a lamp something virtual may block, and per share of the environment's light that may be blocked.
-const LAMP_IMPORTANCE: f32 = 0.25;
-const ENVIRONMENT_GAIN: f32 = 1.0;
+const LAMP_IMPORTANCE: f32 = 0.5;
+const ENVIRONMENT_GAIN: f32 = 2.0;
 /// Environment directions tried per pixel for blocked light.
 const ENVIRONMENT_TRIALS: u32 = 16;
 /// Lights examined per pixel; scenes with more get certainty instead of an estimate.
@@ -226,11 +226,12 @@ fn difference_period(scene: &PackedScene, beam: &Beam, lights: &PilotLights<'_>)
     };
     let mut importance =
         lights.reach_gain * cone_solid_angle_fraction(&scene.frame, position, normal);
-    if lights.uncertain
-        || lights
-            .examined
-            .iter()
-            .any(|l| light_may_be_blocked(&scene.frame, l, position))
+    if lights.uncertain {
+        importance = 1.0;
+    } else if lights
+        .examined
+        .iter()
+        .any(|l| light_may_be_blocked(&scene.frame, l, position))
     {
         importance = importance.max(LAMP_IMPORTANCE);
     }
