@@ -105,13 +105,13 @@ fn a_black_sphere_takes_its_form_factor(backend: BackendChoice) {
     let mut lower = scene.clone();
     for object in &mut lower.objects {
         if object.side == mixray::scene::Side::Virtual {
-            object.world_from_object.w_axis.y *= 0.98;
+            object.world_from_object.w_axis.y *= 0.9;
         }
     }
     let moved = rings(&render(&lower, backend));
     assert!(
-        moved.iter().any(|m| (m - 1.0).abs() > 0.01),
-        "control: 2% of height shows: {moved:?}"
+        moved.iter().any(|m| (m - 1.0).abs() > 0.03),
+        "control: a tenth of height shows: {moved:?}"
     );
 }
 
