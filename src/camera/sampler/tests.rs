@@ -249,8 +249,8 @@ fn sobol_points_follow_the_recurrence() {
 
 #[test]
 fn scrambled_sobol_keeps_its_nets() {
-    // Every dimension alone, and Sobol's first two (the third and first number) in every elementary rectangle, hold exactly one of
-    // 2^m points.
+    // Every dimension alone, and Sobol's first two (the third and first number of set 0, the first two of the others) in every
+    // elementary rectangle, hold exactly one of 2^m points.
     for m in [2u32, 4, 6] {
         let n = 1u32 << m;
         for (pixel, set) in [(0, 0), (1, 0), (2, 1), (3, 5)] {
@@ -265,11 +265,12 @@ fn scrambled_sobol_keeps_its_nets() {
                     .for_each(|p| cells[(p[d] * n as f32) as usize] += 1);
                 assert!(cells.iter().all(|&c| c == 1), "dimension {d}: {cells:?}");
             }
+            let (a, b) = if set == 0 { (2, 0) } else { (0, 1) };
             for split in 0..=m {
                 let (nx, ny) = (1u32 << split, 1u32 << (m - split));
                 let mut cells = vec![0; n as usize];
                 for p in &points {
-                    let cell = (p[2] * nx as f32) as u32 * ny + (p[0] * ny as f32) as u32;
+                    let cell = (p[a] * nx as f32) as u32 * ny + (p[b] * ny as f32) as u32;
                     cells[cell as usize] += 1;
                 }
                 assert!(cells.iter().all(|&c| c == 1), "{nx} x {ny}: {cells:?}");
