@@ -22,7 +22,8 @@ fn draw_of(st: ptr<function, PathState>, purpose: u32, j: u32, count: u32) -> ve
     var key = sample_key(st);
     key.index = key.index * count + j;
     key.total *= count;
-    return sample_4d(key, FIRST_DEPTH_SET + (*st).depth * SETS_PER_DEPTH + purpose);
+    let v = sample_4d(key, FIRST_DEPTH_SET + (*st).depth * SETS_PER_DEPTH + purpose);
+    return vec4<f32>(v.z, v.x, v.y, v.w);
 }
 
 fn sample_key(st: ptr<function, PathState>) -> SampleKey {
@@ -46,5 +47,6 @@ fn accumulate(st: ptr<function, PathState>, unclamped: vec3<f32>) {
 
 fn density_weight(density: f32, pdf: f32) -> f32 {
     if density == DELTA_DENSITY { return 1.0; }
-    return density / (density + pdf);
+    let ratio = pdf / density;
+    return 1.0 / (1.0 + ratio * ratio);
 }

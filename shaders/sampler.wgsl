@@ -127,12 +127,13 @@ fn sobol_4d(stream: u32, index: u32, set_id: u32) -> vec4<u32> {
     if set_id != 0u {
         point = reverseBits(owen_scramble(reverseBits(index), hash_u32(stream ^ 0x3c6ef372u)));
     }
-    let sobol = sobol_reversed(point);
+    var sobol = sobol_reversed(point);
+    if set_id == 0u { sobol = sobol.ywxz; }
     return vec4<u32>(
-        reverseBits(owen_scramble(sobol.y, hash_u32(stream ^ 0xbb67ae85u))),
-        reverseBits(owen_scramble(sobol.w, hash_u32(stream ^ 0x5be0cd19u))),
-        reverseBits(owen_scramble(sobol.x, hash_u32(stream ^ 0xcbbb9d5du))),
-        reverseBits(owen_scramble(sobol.z, hash_u32(stream ^ 0x629a292au))),
+        reverseBits(owen_scramble(sobol.x, hash_u32(stream ^ 0xbb67ae85u))),
+        reverseBits(owen_scramble(sobol.y, hash_u32(stream ^ 0x5be0cd19u))),
+        reverseBits(owen_scramble(sobol.z, hash_u32(stream ^ 0xcbbb9d5du))),
+        reverseBits(owen_scramble(sobol.w, hash_u32(stream ^ 0x629a292au))),
     );
 }
 

@@ -129,7 +129,7 @@ fn light_contribution(
             other = roulette.cone * cone_pdf(s.position, s.ns, l.direction);
             if !bsdf_is_lambertian(s) { other += f.pdf; }
         }
-        weight = count * l.pdf / (count * l.pdf + other);
+        weight = density_weight(count * l.pdf, other);
     }
     let sign = select(1.0, -1.0, difference && real_light);
     return (*st).throughput * f.f_cos * l.radiance * (sign * weight / l.pdf);

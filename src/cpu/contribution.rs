@@ -20,7 +20,7 @@ const FIRST_DEPTH_SET: u32 = 2;
 pub const ESTIMATOR_DIRECT: u32 = 0;
 pub const ESTIMATOR_PAPER: u32 = 1;
 
-/// Random numbers of one decision at the present vertex.
+/// Random numbers of one decision at the present vertex: the first and the last are good alone, the two between as a point of the square.
 pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> [f32; 4] {
     draw_of(scene, st, purpose, 0, 1)
 }
@@ -30,7 +30,9 @@ pub fn draw_of(scene: &PackedScene, st: &PathState, purpose: u32, j: u32, count:
     let mut key = sample_key(scene, st);
     key.index = key.index * count + j;
     key.total *= count;
-    sample_4d(key, FIRST_DEPTH_SET + st.depth * SETS_PER_DEPTH + purpose)
+    let [x, y, z, w] = sample_4d(key, FIRST_DEPTH_SET + st.depth * SETS_PER_DEPTH + purpose);
+    // The samplers spread x with y; what is drawn here chooses by its first number and finds a direction by the next two.
+    [z, x, y, w]
 }
 
 pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {
@@ -61,11 +63,12 @@ pub fn accumulate(scene: &PackedScene, st: &mut PathState, light: Vec3) {
     }
 }
 
-/// Balance heuristic of a direction drawn with `density` against the light technique's `pdf`.
+/// Power heuristic (Veach 1997, section 9.2.3) of a direction drawn with `density` that another technique draws with density `pdf`.
 pub fn density_weight(density: f32, pdf: f32) -> f32 {
     if density == DELTA_DENSITY {
         1.0
     } else {
-        density / (density + pdf)
+        let ratio = pdf / density;
+        1.0 / (1.0 + ratio * ratio)
     }
 }

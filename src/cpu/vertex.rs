@@ -188,7 +188,7 @@ fn light_contribution(
                 other += f.pdf;
             }
         }
-        weight = count * l.pdf / (count * l.pdf + other);
+        weight = density_weight(count * l.pdf, other);
     }
     let sign = if difference && real_light { -1.0 } else { 1.0 };
     st.throughput * f.f_cos * l.radiance * (sign * weight / l.pdf)
