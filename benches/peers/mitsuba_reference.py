@@ -8,7 +8,7 @@ Two passes and a mask with the same seeds, in batches. The file holds, in half f
 
     R, G, B           composite of Eq. 4 without its photograph: the whole is this + (1 - mask) * Ic
     mask.Y            the fraction of primary rays that meet virtual geometry first
-    error.R, .G, .B   standard error of the composite, from the spread of the batches
+    error.R, .G, .B   standard error of the composite, from the spread of the batches and the rounding to half floats
 """
 
 import argparse
@@ -19,6 +19,12 @@ import numpy as np
 from mitsuba_scene import Passes, PeerScene, mi
 
 BATCH_RAYS_PER_PIXEL = 256
+
+
+def half_rounding(values):
+    """Standard error of rounding to half floats."""
+    step = 2.0 ** (np.floor(np.log2(np.maximum(np.abs(values), 2.0**-14))) - 10.0)
+    return step / np.sqrt(12.0)
 
 
 def main():
@@ -43,7 +49,7 @@ def main():
     mask, mixed, real = (total / batches for total in sums)
     added = mask * mixed + (1.0 - mask) * (mixed - real)
     spread = np.maximum(square_sum / batches - (composite_sum / batches) ** 2, 0.0)
-    error = np.sqrt(spread / (batches - 1))
+    error = np.hypot(np.sqrt(spread / (batches - 1)), half_rounding(added))
     planes = np.concatenate([added, mask, error], axis=-1).astype(np.float16)
     names = ["R", "G", "B", "mask.Y", "error.R", "error.G", "error.B"]
     bitmap = mi.Bitmap(planes, pixel_format=mi.Bitmap.PixelFormat.MultiChannel, channel_names=names)
