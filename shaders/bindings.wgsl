@@ -143,6 +143,7 @@ const PIXEL_OUT_OF_REACH: u32 = 2u;
 
 struct PixelInfo {
     difference_period: u32,
+    sample_factor: u32,
     flags: u32,
 }
 

@@ -1,6 +1,6 @@
 // What estimator and vertex share: random numbers of a decision, weights, accumulation. Rust twin: src/cpu/contribution.rs.
 
-import package::bindings::frame;
+import package::bindings::{frame, pixels};
 import package::sampler::{SampleKey, sample_4d};
 import package::state::{DELTA_DENSITY, MODE_REAL, MODE_SHARED, PathState};
 
@@ -9,31 +9,24 @@ const SET_DIFFERENCE_BSDF: u32 = 1u;
 const SET_DIFFERENCE_CONE: u32 = 2u;
 const SET_PATH_LIGHT: u32 = 3u;
 const SET_PATH_BSDF: u32 = 4u;
-const SET_DIFFERENCE_CHOICE: u32 = 5u;
-const SETS_PER_DEPTH: u32 = 6u;
+const SETS_PER_DEPTH: u32 = 5u;
 const FIRST_DEPTH_SET: u32 = 2u;
 
 fn draw(st: ptr<function, PathState>, purpose: u32) -> vec4<f32> {
-    return draw_of(st, purpose, 0u, 1u);
-}
-
-fn draw_of(st: ptr<function, PathState>, purpose: u32, j: u32, count: u32) -> vec4<f32> {
-    var key = sample_key(st);
-    key.index = key.index * count + j;
-    key.total *= count;
-    let v = sample_4d(key, FIRST_DEPTH_SET + (*st).depth * SETS_PER_DEPTH + purpose);
+    let v = sample_4d(sample_key(st), FIRST_DEPTH_SET + (*st).depth * SETS_PER_DEPTH + purpose);
     return vec4<f32>(v.z, v.x, v.y, v.w);
 }
 
 fn sample_key(st: ptr<function, PathState>) -> SampleKey {
-    return SampleKey((*st).pixel, (*st).index, frame.rays_total, frame.seed, frame.sampler);
+    return SampleKey((*st).pixel, (*st).index, frame.rays_total * pixels[(*st).pixel].sample_factor, frame.seed, frame.sampler);
 }
 
 fn accumulate(st: ptr<function, PathState>, unclamped: vec3<f32>) {
     var light = unclamped;
     if (*st).indirect != 0u {
+        let limit = frame.clamp_indirect * (*st).weight;
         let largest = max(max(abs(light.x), abs(light.y)), abs(light.z));
-        if largest > frame.clamp_indirect { light *= frame.clamp_indirect / largest; }
+        if largest > limit { light *= limit / largest; }
     }
     @if(paper) {
         if (*st).mode != MODE_REAL { (*st).radiance += light; }

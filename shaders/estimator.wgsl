@@ -37,7 +37,6 @@ fn turn_offset(pixel: u32, period: u32) -> u32 {
 fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
     var st = path_state(pixel, index);
     let may_meet_virtual = (pixels[pixel].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u;
-    st.rays.primary = select(1u, 0u, is_real_pass);
     @if(!paper) {
         if !is_real_pass && !may_meet_virtual {
             let turn = difference_turn(pixel, index);
@@ -49,6 +48,7 @@ fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
             primary_missed_virtual(&st, turn != NONE);
         }
     }
+    st.rays.primary = select(1u, 0u, is_real_pass);
     let u = sample_4d(sample_key(&st), 0u);
     let x = f32(pixel % frame.width) + u.x;
     let y = f32(pixel / frame.width) + u.y;
@@ -99,7 +99,8 @@ fn virtual_is_nearer(hit_virtual: Hit, hit_real: Hit) -> bool {
 
 fn primary_missed_virtual(st: ptr<function, PathState>, has_turn: bool) {
     let period = pixels[(*st).pixel].difference_period;
-    (*st).throughput = vec3<f32>(select(0.0, f32(period), has_turn));
+    (*st).weight = select(0.0, f32(period), has_turn);
+    (*st).throughput = vec3<f32>((*st).weight);
     if has_turn || (frame.flags & FRAME_AOVS) != 0u {
         (*st).stage = STAGE_PRIMARY_REAL;
         (*st).request = REQUEST_CLOSEST_REAL;

@@ -20,7 +20,7 @@ struct PixelSums {
     n_real: u32,
     non_finite: u32,
     first_non_finite: u32,
-    pad: u32,
+    sample_factor: u32,
 }
 
 struct GuideSums {

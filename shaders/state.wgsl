@@ -105,6 +105,7 @@ struct PathState {
     difference_coincidence_ratio: f32,
     mask: u32,
     indirect: u32,
+    weight: f32,
     rays: RayCounts,
 }
 
@@ -130,6 +131,7 @@ fn path_state(pixel: u32, index: u32) -> PathState {
     st.vertex_hit = miss();
     st.real_hit = miss();
     st.throughput = vec3<f32>(1.0);
+    st.weight = 1.0;
     st.density = DELTA_DENSITY;
     st.depth_m = FAR;
     return st;

@@ -3,9 +3,9 @@
 import package::bindings::{NONE, frame, materials, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT};
 import package::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample};
 import package::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
-import package::contribution::{accumulate, density_weight, draw, draw_of};
+import package::contribution::{accumulate, density_weight, draw};
 import package::contribution::{
-    SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CHOICE, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
+    SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
 };
 import package::lights::{LightSample, light_pdf_hit, light_sample};
 import package::math::{dot3, exp_, safe_sqrt};
@@ -24,7 +24,6 @@ const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
 const SHADOW_SHORTEN: f32 = 2e-5;
 const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
-const DIFFERENCE_LIGHTS: u32 = 2u;
 const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
 
 struct Roulette {
@@ -107,36 +106,20 @@ fn add_emission(st: ptr<function, PathState>, s: Surface, distance: f32) {
     accumulate(st, (*st).throughput * s.emission * weight);
 }
 
-fn light_draws(st: ptr<function, PathState>) -> u32 {
-    return select(1u, DIFFERENCE_LIGHTS, is_difference(st) && (*st).depth == 1u);
-}
-
 fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
     if frame.light_count == 0u || bsdf_is_delta(s) { return; }
     let difference = is_difference(st);
     let set_id = select(SET_PATH_LIGHT, SET_DIFFERENCE_LIGHT, difference);
-    let count = light_draws(st);
-    var choice = vec4<f32>(0.0);
-    if count > 1u { choice = draw(st, SET_DIFFERENCE_CHOICE); }
-    var sum = 0.0;
-    var chosen_size = 1.0;
-    var contribution = vec3<f32>(0.0);
-    for (var j = 0u; j < count; j++) {
-        let l = light_sample(s.position, draw_of(st, set_id, j, count));
-        let candidate = light_contribution(st, s, wo, roulette, l, f32(count));
-        let size = max_element(abs(candidate));
-        sum += size;
-        if size > 0.0 && choice[j] * sum < size {
-            contribution = candidate;
-            chosen_size = size;
-            plan_shadow(st, s, l);
-        }
+    let l = light_sample(s.position, draw(st, set_id));
+    let contribution = light_contribution(st, s, wo, roulette, l);
+    if any(contribution != vec3<f32>(0.0)) {
+        (*st).shadow_contribution = contribution;
+        plan_shadow(st, s, l);
     }
-    (*st).shadow_contribution = contribution * (sum / (chosen_size * f32(count)));
 }
 
 fn light_contribution(
-    st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette, l: LightSample, count: f32,
+    st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette, l: LightSample,
 ) -> vec3<f32> {
     let difference = is_difference(st);
     let real_light = l.side == 0u;
@@ -155,7 +138,7 @@ fn light_contribution(
                 if !bsdf_is_lambertian(s) { other += f.pdf; }
             }
         }
-        weight = density_weight(count * l.pdf, other);
+        weight = density_weight(l.pdf, other);
     }
     let sign = select(1.0, -1.0, difference && real_light);
     return (*st).throughput * f.f_cos * l.radiance * (sign * weight / l.pdf);
@@ -190,7 +173,7 @@ fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: 
     (*st).pending |= PENDING_NEXT;
     (*st).next_direction = c.direction;
     (*st).next_throughput = (*st).throughput * f.f_cos * (1.0 / density);
-    (*st).next_density = density / f32(light_draws(st));
+    (*st).next_density = density;
     (*st).next_medium = medium_along(st, s, c.direction);
 }
 
@@ -223,8 +206,8 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, ro
             (*st).difference_direction = b.wi;
             (*st).difference_lambertian = u32(bsdf_is_lambertian(s));
             (*st).difference_normal = s.ns;
-            (*st).difference_cone_probability = roulette.cone / f32(light_draws(st));
-            (*st).difference_density = select(b.pdf / f32(light_draws(st)), DELTA_DENSITY, b.delta);
+            (*st).difference_cone_probability = roulette.cone;
+            (*st).difference_density = select(b.pdf, DELTA_DENSITY, b.delta);
             (*st).difference_throughput = throughput * (1.0 / roulette.bsdf);
             (*st).difference_medium = medium_along(st, s, b.wi);
             return;

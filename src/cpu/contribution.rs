@@ -6,14 +6,13 @@ use super::state::*;
 use crate::camera::sampler::{SampleKey, sample_4d};
 use crate::packed::PackedScene;
 
-// Sample sets: 0 is pixel and lens, then six a depth from 8 on.
+// Sample sets: 0 is pixel and lens, then five a depth from 7 on.
 pub const SET_DIFFERENCE_LIGHT: u32 = 0;
 pub const SET_DIFFERENCE_BSDF: u32 = 1;
 pub const SET_DIFFERENCE_CONE: u32 = 2;
 pub const SET_PATH_LIGHT: u32 = 3;
 pub const SET_PATH_BSDF: u32 = 4;
-pub const SET_DIFFERENCE_CHOICE: u32 = 5;
-const SETS_PER_DEPTH: u32 = 6;
+const SETS_PER_DEPTH: u32 = 5;
 const FIRST_DEPTH_SET: u32 = 2;
 
 pub const ESTIMATOR_DIRECT: u32 = 0;
@@ -21,15 +20,8 @@ pub const ESTIMATOR_PAPER: u32 = 1;
 
 /// Random numbers of one decision at the present vertex: the first and the last are good alone, the two between as a point of the square.
 pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> [f32; 4] {
-    draw_of(scene, st, purpose, 0, 1)
-}
-
-/// Random numbers of number `j` of `count` equal decisions: together, those of all samples are one well-spread set.
-pub fn draw_of(scene: &PackedScene, st: &PathState, purpose: u32, j: u32, count: u32) -> [f32; 4] {
-    let mut key = sample_key(scene, st);
-    key.index = key.index * count + j;
-    key.total *= count;
-    let [x, y, z, w] = sample_4d(key, FIRST_DEPTH_SET + st.depth * SETS_PER_DEPTH + purpose);
+    let set = FIRST_DEPTH_SET + st.depth * SETS_PER_DEPTH + purpose;
+    let [x, y, z, w] = sample_4d(sample_key(scene, st), set);
     // The samplers spread x with y; what is drawn here chooses by its first number and finds a direction by the next two.
     [z, x, y, w]
 }
@@ -38,7 +30,7 @@ pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {
     SampleKey {
         pixel: st.pixel,
         index: st.index,
-        total: scene.frame.rays_total,
+        total: scene.frame.rays_total * scene.pixels[st.pixel as usize].sample_factor,
         seed: scene.frame.seed,
         sampler: scene.frame.sampler,
     }
@@ -49,9 +41,11 @@ pub fn accumulate(scene: &PackedScene, st: &mut PathState, light: Vec3) {
     let paper = scene.frame.estimator == ESTIMATOR_PAPER;
     let mut light = light;
     if st.indirect {
+        // How many samples this one stands for does not change what it is clamped to.
+        let limit = scene.frame.clamp_indirect * st.weight;
         let largest = light.abs().max_element();
-        if largest > scene.frame.clamp_indirect {
-            light *= scene.frame.clamp_indirect / largest;
+        if largest > limit {
+            light *= limit / largest;
         }
     }
     if !(paper && st.mode == MODE_REAL) {

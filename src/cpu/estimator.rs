@@ -12,7 +12,7 @@ use super::vertex::shade_vertex;
 use crate::accel::Hit;
 use crate::camera::lens::camera_ray;
 use crate::camera::sampler::sample_4d;
-use crate::light::cones::cone_pdf;
+use crate::light::cones::{Cones, cone_pdf};
 use crate::light::environment::env_radiance;
 use crate::light::lights::env_pdf;
 use crate::material::{Surface, bsdf_albedo, surface_at};
@@ -61,8 +61,6 @@ pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool
     let mut st = PathState::new(pixel, index);
     let may_meet_virtual = scene.pixels[pixel as usize].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0;
     let direct = !real_pass && scene.frame.estimator != ESTIMATOR_PAPER;
-    // A replayed sample's primary ray was counted when it was first taken.
-    st.rays.primary = u32::from(!real_pass);
     if direct && !may_meet_virtual {
         // The samples that have a turn are numbered by it, and so are spread over the pixel and the lens as a set of their own.
         let turn = difference_turn(scene, pixel, index);
@@ -73,6 +71,8 @@ pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool
         }
         primary_missed_virtual(scene, &mut st, turn != NONE);
     }
+    // A replayed sample's primary ray was counted when it was first taken.
+    st.rays.primary = u32::from(!real_pass);
     let u = sample_4d(sample_key(scene, &st), 0);
     let x = (pixel % scene.frame.width) as f32 + u[0];
     let y = (pixel / scene.frame.width) as f32 + u[1];
@@ -125,7 +125,8 @@ fn virtual_is_nearer(hit_virtual: Hit, hit_real: Hit) -> bool {
 /// Nothing virtual was met: the difference is evaluated if the sample has a turn, before the real ray is paid for.
 fn primary_missed_virtual(scene: &PackedScene, st: &mut PathState, has_turn: bool) {
     let period = scene.pixels[st.pixel as usize].difference_period;
-    st.throughput = Vec3::splat(if has_turn { period as f32 } else { 0.0 });
+    st.weight = if has_turn { period as f32 } else { 0.0 };
+    st.throughput = Vec3::splat(st.weight);
     if has_turn || scene.frame.flags & FRAME_AOVS != 0 {
         st.stage = STAGE_PRIMARY_REAL;
         st.request = REQUEST_CLOSEST_REAL;
@@ -374,9 +375,7 @@ fn difference_bsdf(scene: &PackedScene, st: &mut PathState) {
 fn vertex_cone_density(scene: &PackedScene, st: &PathState) -> f32 {
     st.difference_cone_probability
         * cone_pdf(
-            &scene.frame,
-            st.position,
-            st.difference_normal,
+            &Cones::at(&scene.frame, st.position, st.difference_normal),
             st.direction,
         )
 }

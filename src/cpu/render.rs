@@ -19,7 +19,7 @@ const TILE_PIXELS: usize = 512;
 /// Renders a pass into the film. A cancelled pass leaves whole pixels only: each has taken all of the pass's samples or none.
 pub fn render_pass(scene: &PackedScene, film: &mut Film, pass: Pass, cancel: &Cancel) -> RayTotals {
     let totals = AtomicTotals::default();
-    let first_sample = film.first_sample;
+    let first_ray = film.first_sample;
     let selected: Vec<bool> = match pass {
         Pass::Main { .. } => Vec::new(),
         Pass::Real { everywhere } => (0..film.pixels.len())
@@ -51,17 +51,19 @@ pub fn render_pass(scene: &PackedScene, film: &mut Film, pass: Pass, cancel: &Ca
             let mut counts = RayCounts64::default();
             for (i, sums) in sums.iter_mut().enumerate() {
                 let pixel = tile * TILE_PIXELS + i;
+                let factor = scene.pixels[pixel].sample_factor;
+                let first_sample = first_ray * factor;
                 match pass {
                     Pass::Main { end } => {
                         if scene.pixels[pixel].flags & PIXEL_OUT_OF_REACH != 0 {
                             continue;
                         }
+                        let end = end * factor;
                         while first_sample + sums.n < end {
                             let index = first_sample + sums.n;
                             let idle = samples_without_turn(scene, pixel as u32, index, end);
                             if idle > 0 {
                                 sums.add_nothing(idle);
-                                counts.kinds[0] += u64::from(idle);
                                 continue;
                             }
                             let guide = if with_guides {

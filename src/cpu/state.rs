@@ -122,9 +122,10 @@ pub struct PathState {
     // The path being followed.
     pub vertex_hit: Hit,
     pub throughput: Vec3,
-    /// Sum of the densities of the techniques that could have drawn the present direction, over the number of lights drawn at the vertex it
-    /// leaves (so that it compares with one light's density); DELTA_DENSITY: one technique only.
+    /// Sum of the densities of the techniques that could have drawn the present direction; DELTA_DENSITY: one technique only.
     pub density: f32,
+    /// Samples that this one stands for.
+    pub weight: f32,
     /// The path has scattered other than by a mirror or a smooth interface: what it finds is clamped.
     pub indirect: bool,
 
@@ -158,8 +159,7 @@ pub struct PathState {
     pub difference_medium: u32,
     /// The vertex is Lambertian: what the cones cover is left to them.
     pub difference_lambertian: bool,
-    /// Shading normal and roulette probability of the cones (over the number of lights drawn) at that vertex, to weigh a BSDF direction
-    /// against them.
+    /// Shading normal and roulette probability of the cones at that vertex, to weigh a BSDF direction against them.
     pub difference_normal: Vec3,
     pub difference_cone_probability: f32,
 
@@ -200,6 +200,7 @@ impl PathState {
             vertex_hit: MISS,
             throughput: Vec3::ONE,
             density: DELTA_DENSITY,
+            weight: 1.0,
             indirect: false,
             shadow_direction: Vec3::ZERO,
             shadow_t_max: 0.0,

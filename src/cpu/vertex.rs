@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::contribution::*;
 use super::state::*;
 use crate::light::cones::{
-    cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
+    Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
 };
 use crate::light::lights::{LightSample, light_pdf_hit, light_sample};
 use crate::material::{
@@ -28,16 +28,15 @@ const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
 const SHADOW_SHORTEN: f32 = 2e-5;
 const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
-/// Lights drawn at the first difference vertex, of which one is traced: most directions meet nothing virtual and cost no ray.
-const DIFFERENCE_LIGHTS: u32 = 2;
 /// Surfaces that scatter nothing.
 const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
 
-/// With what probability the techniques of a difference vertex are played.
-#[derive(Clone, Copy)]
-struct Roulette {
-    cone: f32,
-    bsdf: f32,
+/// What the techniques of a difference vertex share.
+struct Techniques {
+    cones: Cones,
+    /// With what probability (b) and (c) are played.
+    cone_probability: f32,
+    bsdf_probability: f32,
 }
 
 /// Adds the emission at the vertex and plans its shadow ray and continuations. A difference vertex (mode `MODE_DIFFERENCE`) does not emit,
@@ -80,24 +79,29 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     st.side = side;
     st.real_t_min = scene.materials[s.material as usize].self_shadow_bias;
 
-    let mut roulette = Roulette {
-        cone: 1.0,
-        bsdf: 1.0,
-    };
-    if difference {
-        let strength = (st.throughput * bsdf_albedo(s, wo)).abs().max_element();
-        let reach = cone_solid_angle_fraction(&scene.frame, s.position, s.ns);
-        roulette.cone = (CONE_ROULETTE_GAIN * strength * reach).clamp(CONE_ROULETTE_FLOOR, 1.0);
-        if bsdf_is_lambertian(s) {
-            roulette.bsdf =
-                (RECURSION_ROULETTE_GAIN * strength).clamp(RECURSION_ROULETTE_FLOOR, 1.0);
-        }
+    let techniques = difference.then(|| techniques_at(scene, st, s, wo));
+    next_event(scene, st, s, wo, techniques.as_ref());
+    if let Some(techniques) = &techniques {
+        plan_cone(scene, st, s, wo, techniques);
     }
-    next_event(scene, st, s, wo, roulette);
-    if difference {
-        plan_cone(scene, st, s, wo, roulette);
+    plan_continuation(scene, st, s, wo, techniques.as_ref());
+}
+
+fn techniques_at(scene: &PackedScene, st: &PathState, s: &Surface, wo: Vec3) -> Techniques {
+    let cones = Cones::at(&scene.frame, s.position, s.ns);
+    let strength = (st.throughput * bsdf_albedo(s, wo)).abs().max_element();
+    let reach = cone_solid_angle_fraction(&cones);
+    let cone_probability = (CONE_ROULETTE_GAIN * strength * reach).clamp(CONE_ROULETTE_FLOOR, 1.0);
+    let mut bsdf_probability = 1.0;
+    if bsdf_is_lambertian(s) {
+        bsdf_probability =
+            (RECURSION_ROULETTE_GAIN * strength).clamp(RECURSION_ROULETTE_FLOOR, 1.0);
     }
-    plan_continuation(scene, st, s, wo, roulette);
+    Techniques {
+        cones,
+        cone_probability,
+        bsdf_probability,
+    }
 }
 
 /// Whether the surface reached lies in the plane of the one that the ray has left, as far as their errors tell.
@@ -128,19 +132,15 @@ fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: 
     accumulate(scene, st, light);
 }
 
-/// Lights drawn at the present vertex.
-fn light_draws(st: &PathState) -> u32 {
-    if st.mode == MODE_DIFFERENCE && st.depth == 1 {
-        DIFFERENCE_LIGHTS
-    } else {
-        1
-    }
-}
-
-/// Draws lights and plans one shadow ray, to the light chosen in proportion to what it would contribute (resampled importance sampling,
-/// Talbot 2005). At a difference vertex the technique competes with the cones (at their effective density) and, unless the surface is
-/// Lambertian, with the BSDF.
-fn next_event(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, roulette: Roulette) {
+/// Draws a light and plans its shadow ray. At a difference vertex the technique competes with the cones (at their effective density) and, unless
+/// the surface is Lambertian, with the BSDF.
+fn next_event(
+    scene: &PackedScene,
+    st: &mut PathState,
+    s: &Surface,
+    wo: Vec3,
+    techniques: Option<&Techniques>,
+) {
     if scene.frame.light_count == 0 || bsdf_is_delta(s) {
         return;
     }
@@ -150,26 +150,12 @@ fn next_event(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, ro
     } else {
         SET_PATH_LIGHT
     };
-    let count = light_draws(st);
-    let mut choice = [0.0; 4];
-    if count > 1 {
-        choice = draw(scene, st, SET_DIFFERENCE_CHOICE);
+    let l = light_sample(scene, s.position, draw(scene, st, set));
+    let contribution = light_contribution(scene, st, s, wo, techniques, &l);
+    if contribution != Vec3::ZERO {
+        st.shadow_contribution = contribution;
+        plan_shadow(st, s, &l);
     }
-    let mut sum = 0.0;
-    let mut chosen_size = 1.0;
-    let mut contribution = Vec3::ZERO;
-    for j in 0..count {
-        let l = light_sample(scene, s.position, draw_of(scene, st, set, j, count));
-        let candidate = light_contribution(scene, st, s, wo, roulette, &l, count as f32);
-        let size = candidate.abs().max_element();
-        sum += size;
-        if size > 0.0 && choice[j as usize] * sum < size {
-            contribution = candidate;
-            chosen_size = size;
-            plan_shadow(st, s, &l);
-        }
-    }
-    st.shadow_contribution = contribution * (sum / (chosen_size * count as f32));
 }
 
 /// What a drawn light adds if nothing hides it (or, for the difference, if only something virtual does); zero if that cannot be.
@@ -178,9 +164,8 @@ fn light_contribution(
     st: &PathState,
     s: &Surface,
     wo: Vec3,
-    roulette: Roulette,
+    techniques: Option<&Techniques>,
     l: &LightSample,
-    count: f32,
 ) -> Vec3 {
     let difference = st.mode == MODE_DIFFERENCE;
     let real_light = l.side == 0;
@@ -197,13 +182,13 @@ fn light_contribution(
     let mut weight = 1.0;
     if !l.delta {
         let mut other = f.pdf;
-        if difference {
-            other = roulette.cone * cone_pdf(&scene.frame, s.position, s.ns, l.direction);
+        if let Some(t) = techniques {
+            other = t.cone_probability * cone_pdf(&t.cones, l.direction);
             if !bsdf_is_lambertian(s) {
                 other += f.pdf;
             }
         }
-        weight = density_weight(count * l.pdf, other);
+        weight = density_weight(l.pdf, other);
     }
     let sign = if difference && real_light { -1.0 } else { 1.0 };
     st.throughput * f.f_cos * l.radiance * (sign * weight / l.pdf)
@@ -228,12 +213,18 @@ fn plan_shadow(st: &mut PathState, s: &Surface, l: &LightSample) {
 
 /// (b): a direction inside the cones of the virtual bounding spheres. Those about the shading normal leave nothing out: Lambert's mirrored
 /// cosine is 0 under its horizon.
-fn plan_cone(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, roulette: Roulette) {
+fn plan_cone(
+    scene: &PackedScene,
+    st: &mut PathState,
+    s: &Surface,
+    wo: Vec3,
+    techniques: &Techniques,
+) {
     let u = draw(scene, st, SET_DIFFERENCE_CONE);
-    if scene.frame.sphere_count == 0 || u[3] >= roulette.cone {
+    if scene.frame.sphere_count == 0 || u[3] >= techniques.cone_probability {
         return;
     }
-    let c = cone_sample(&scene.frame, s.position, s.ns, [u[0], u[1], u[2]]);
+    let c = cone_sample(&techniques.cones, [u[0], u[1], u[2]]);
     if c.pdf <= 0.0 {
         return;
     }
@@ -241,14 +232,14 @@ fn plan_cone(scene: &PackedScene, st: &mut PathState, s: &Surface, wo: Vec3, rou
     if f.f_cos.max_element() <= 0.0 {
         return;
     }
-    let mut density = roulette.cone * c.pdf;
+    let mut density = techniques.cone_probability * c.pdf;
     if !bsdf_is_lambertian(s) {
         density += f.pdf;
     }
     st.pending |= PENDING_NEXT;
     st.next_direction = c.direction;
     st.next_throughput = st.throughput * f.f_cos * (1.0 / density);
-    st.next_density = density / light_draws(st) as f32;
+    st.next_density = density;
     st.next_medium = medium_along(st, s, c.direction);
 }
 
@@ -266,9 +257,9 @@ fn plan_continuation(
     st: &mut PathState,
     s: &Surface,
     wo: Vec3,
-    roulette: Roulette,
+    techniques: Option<&Techniques>,
 ) {
-    let difference = st.mode == MODE_DIFFERENCE;
+    let difference = techniques.is_some();
     if difference && bsdf_is_lambertian(s) && st.depth >= scene.frame.max_bounces {
         return;
     }
@@ -281,7 +272,7 @@ fn plan_continuation(
             SET_PATH_BSDF
         },
     );
-    if u[3] >= roulette.bsdf {
+    if techniques.is_some_and(|t| u[3] >= t.bsdf_probability) {
         return;
     }
     let b = bsdf_sample(s, wo, [u[0], u[1], u[2]]);
@@ -290,7 +281,7 @@ fn plan_continuation(
     }
     let density = if b.delta { DELTA_DENSITY } else { b.pdf };
     let mut throughput = st.throughput * b.weight;
-    if difference {
+    if let Some(t) = techniques {
         st.pending |= PENDING_DIFFERENCE;
         st.difference_position = st.position;
         st.difference_offset = st.offset;
@@ -300,13 +291,9 @@ fn plan_continuation(
         st.difference_direction = b.wi;
         st.difference_lambertian = bsdf_is_lambertian(s);
         st.difference_normal = s.ns;
-        st.difference_cone_probability = roulette.cone / light_draws(st) as f32;
-        st.difference_density = if b.delta {
-            DELTA_DENSITY
-        } else {
-            b.pdf / light_draws(st) as f32
-        };
-        st.difference_throughput = throughput * (1.0 / roulette.bsdf);
+        st.difference_cone_probability = t.cone_probability;
+        st.difference_density = if b.delta { DELTA_DENSITY } else { b.pdf };
+        st.difference_throughput = throughput * (1.0 / t.bsdf_probability);
         st.difference_medium = medium_along(st, s, b.wi);
         return;
     }

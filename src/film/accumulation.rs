@@ -43,7 +43,7 @@ pub enum MergeError {
 pub struct Film {
     pub width: u32,
     pub height: u32,
-    /// Index of the first sample of every pixel: above 0 where this film holds a later range of a render's samples.
+    /// First ray per pixel: above 0 where this film holds a later range of a render's samples.
     pub first_sample: u32,
     pub pixels: Vec<PixelSums>,
     /// Empty unless depth, normal and albedo were asked for.
@@ -63,20 +63,39 @@ impl Film {
         }
     }
 
+    /// Says how many samples each pixel takes for every ray per pixel, before the first of them.
+    pub fn set_sample_factors(&mut self, factors: impl Iterator<Item = u32>) {
+        for (sums, factor) in self.pixels.iter_mut().zip(factors) {
+            sums.sample_factor = factor;
+        }
+    }
+
+    /// Index of a pixel's first sample in this film.
+    pub fn first_index(&self, pixel: usize) -> u32 {
+        self.first_sample * self.pixels[pixel].sample_factor.max(1)
+    }
+
+    /// Index after a pixel's last sample, if it takes those of the rays up to `end`.
+    pub fn end_index(&self, pixel: usize, end: u32) -> u32 {
+        end * self.pixels[pixel].sample_factor.max(1)
+    }
+
     /// Adds the pixel's next sample.
     pub fn add(&mut self, pixel: usize, sample: &Sample) {
+        let first = self.first_index(pixel);
         let sums = &mut self.pixels[pixel];
-        let index = self.first_sample + sums.n;
+        let index = first + sums.n;
         sums.add(index, sample);
         if let (Some(guide), Some(sums)) = (sample.guide, self.guides.get_mut(pixel)) {
             guide_add(sums, guide.depth_m, guide.normal, guide.albedo);
         }
     }
 
-    /// Adds the real radiance of the pixel's sample number `first_sample + n_real`.
+    /// Adds the real radiance of the pixel's sample number `first_index + n_real`.
     pub fn add_real(&mut self, pixel: usize, is_virtual: bool, real: Vec3) {
+        let first = self.first_index(pixel);
         let sums = &mut self.pixels[pixel];
-        let index = self.first_sample + sums.n_real;
+        let index = first + sums.n_real;
         pixel_add_real(sums, index, is_virtual, real);
     }
 
@@ -85,7 +104,7 @@ impl Film {
     }
 
     /// An edge pixel whose real radiance is not known for all its samples; they have to be replayed, from index
-    /// `first_sample + n_real` on, before its composite is Eq. 4.
+    /// `first_index + n_real` on, before its composite is Eq. 4.
     pub fn needs_real(&self, pixel: usize) -> bool {
         let sums = &self.pixels[pixel];
         kind(sums) == PixelKind::Edge && sums.n_real < sums.n
@@ -143,9 +162,11 @@ impl Film {
         for (pixel, (a, b)) in self.pixels.iter().zip(&other.pixels).enumerate() {
             // A pixel without samples in both films is skipped in the whole render.
             let skipped = a.n == 0 && b.n == 0;
-            if !skipped && self.first_sample + a.n != other.first_sample {
-                let range =
-                    |film: &Film, n| format!("{}..{}", film.first_sample, film.first_sample + n);
+            if !skipped && self.first_index(pixel) + a.n != other.first_index(pixel) {
+                let range = |film: &Film, n| {
+                    let first = film.first_index(pixel);
+                    format!("{first}..{}", first + n)
+                };
                 return Err(MergeError::NotAdjacent {
                     pixel,
                     first: range(self, a.n),

@@ -121,7 +121,8 @@ pub struct PixelSums {
     pub non_finite: u32,
     /// Index of the first of those; means nothing while `non_finite` is 0.
     pub first_non_finite: u32,
-    pub pad: u32,
+    /// Samples that the pixel takes for every ray per pixel asked for; 0 counts as 1.
+    pub sample_factor: u32,
 }
 
 impl PixelSums {
@@ -353,15 +354,13 @@ mod tests {
             };
         }
         assert_eq!(layout("Sum3"), host!(Sum3: hi lo));
-        let pixel =
-            host!(PixelSums: m_im diff m_ir r_ir sq n m n_real non_finite first_non_finite pad);
+        let pixel = host!(PixelSums: m_im diff m_ir r_ir sq n m n_real non_finite first_non_finite sample_factor);
         assert_eq!(layout("PixelSums"), pixel);
         assert_eq!(
             layout("GuideSums"),
             host!(GuideSums: depth_hi depth_lo normal albedo hits pad)
         );
-        let swapped =
-            host!(PixelSums: diff m_im m_ir r_ir sq n m n_real non_finite first_non_finite pad);
+        let swapped = host!(PixelSums: diff m_im m_ir r_ir sq n m n_real non_finite first_non_finite sample_factor);
         assert_ne!(layout("PixelSums"), swapped, "control");
     }
 

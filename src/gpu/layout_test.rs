@@ -131,6 +131,7 @@ fn host() -> Vec<(&'static str, u32, Fields)> {
         }),
         host_fields!(PixelInfo {
             difference_period,
+            sample_factor,
             flags
         }),
     ]

@@ -472,23 +472,31 @@ impl GpuBackend {
 
 /// The samples that every pixel within reach of something virtual still lacks.
 pub(super) fn main_work(pixels: &[PixelInfo], film: &Film, end: u32) -> Vec<PixelWork> {
-    let next = |pixel: usize| film.first_sample + film.pixels[pixel].n;
-    (0..film.pixels.len())
-        .filter(|&pixel| pixels[pixel].flags & PIXEL_OUT_OF_REACH == 0 && next(pixel) < end)
-        .map(|pixel| PixelWork::new(pixel as u32, next(pixel)..end))
-        .collect()
+    let mut work: Vec<PixelWork> = (0..film.pixels.len())
+        .filter(|&pixel| pixels[pixel].flags & PIXEL_OUT_OF_REACH == 0)
+        .map(|pixel| {
+            let next = film.first_index(pixel) + film.pixels[pixel].n;
+            PixelWork::new(pixel as u32, next..film.end_index(pixel, end))
+        })
+        .filter(|work| work.len() > 0)
+        .collect();
+    // Pixels that share a batch take equally many samples of it: no lanes stay empty.
+    work.sort_by_key(|work| std::cmp::Reverse(work.len()));
+    work
 }
 
 /// The real samples that edge pixels lack; `everywhere`: those of all pixels that are not wholly virtual.
 pub(super) fn real_work(film: &Film, everywhere: bool) -> Vec<PixelWork> {
-    let first = film.first_sample;
     film.pixels
         .iter()
         .enumerate()
         .filter(|&(pixel, sums)| {
             film.needs_real(pixel) || (everywhere && sums.m < sums.n && sums.n_real < sums.n)
         })
-        .map(|(pixel, sums)| PixelWork::new(pixel as u32, first + sums.n_real..first + sums.n))
+        .map(|(pixel, sums)| {
+            let first = film.first_index(pixel);
+            PixelWork::new(pixel as u32, first + sums.n_real..first + sums.n)
+        })
         .collect()
 }
 

@@ -313,10 +313,7 @@ fn a_pass_asks_for_what_each_pixel_lacks() {
         film.add(1, &sample(index == 0));
         film.add(2, &sample(false));
     }
-    let mut pixels = [PixelInfo {
-        difference_period: 1,
-        flags: 0,
-    }; 4];
+    let mut pixels = [PixelInfo::uniform(0); 4];
     pixels[3].flags = PIXEL_OUT_OF_REACH;
     let work = |pixel, samples| PixelWork::new(pixel, samples);
     assert_eq!(

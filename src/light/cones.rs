@@ -8,7 +8,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use crate::math::{cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
-use crate::packed::Frame;
+use crate::packed::{Frame, MAX_SPHERES};
 
 /// Cones with a squared sine above this are sampled as the hemisphere: uniform sampling would waste what lies below the horizon.
 const WIDE_SIN2: f32 = 0.5;
@@ -23,6 +23,7 @@ const SPHERE_PADDING_DISTANCE2: f32 = 2e-10;
 const COSINE_PADDING: f32 = 1e-6;
 
 /// One sphere seen from a point.
+#[derive(Clone, Copy)]
 struct Cone {
     /// Unit, to the centre.
     axis: Vec3,
@@ -34,6 +35,14 @@ struct Cone {
     /// Upper estimate of the cosine-weighted share of the hemisphere that it covers; 0 if it is wholly below the horizon.
     weight: f32,
 }
+
+const UNSEEN: Cone = Cone {
+    axis: Vec3::Z,
+    sin2: 0.0,
+    one_minus_cos: 0.0,
+    wide: false,
+    weight: 0.0,
+};
 
 fn cone_of(frame: &Frame, i: u32, position: Vec3, ns: Vec3) -> Cone {
     let sphere = frame.spheres[i as usize];
@@ -68,6 +77,37 @@ fn cone_of(frame: &Frame, i: u32, position: Vec3, ns: Vec3) -> Cone {
     }
 }
 
+/// All spheres seen from a point, computed once for all that is asked there. (The shader computes them anew for each question: it has
+/// arithmetic to spare, but no memory.)
+pub struct Cones {
+    cones: [Cone; MAX_SPHERES],
+    count: usize,
+    /// Of the weights.
+    total: f32,
+    ns: Vec3,
+}
+
+impl Cones {
+    /// Seen from `position` on a surface with the unit shading normal `ns`.
+    pub fn at(frame: &Frame, position: Vec3, ns: Vec3) -> Self {
+        let mut seen = Self {
+            cones: [UNSEEN; MAX_SPHERES],
+            count: frame.sphere_count as usize,
+            total: 0.0,
+            ns,
+        };
+        for i in 0..seen.count {
+            seen.cones[i] = cone_of(frame, i as u32, position, ns);
+            seen.total += seen.cones[i].weight;
+        }
+        seen
+    }
+
+    fn seen(&self) -> &[Cone] {
+        &self.cones[..self.count]
+    }
+}
+
 /// A direction inside the cones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConeSample {
@@ -77,26 +117,21 @@ pub struct ConeSample {
 }
 
 /// Draws a direction: u[0] chooses the sphere, u[1] and u[2] the direction.
-pub fn cone_sample(frame: &Frame, position: Vec3, ns: Vec3, u: [f32; 3]) -> ConeSample {
-    let mut total = 0.0;
-    for i in 0..frame.sphere_count {
-        total += cone_of(frame, i, position, ns).weight;
-    }
-    if total <= 0.0 {
+pub fn cone_sample(cones: &Cones, u: [f32; 3]) -> ConeSample {
+    if cones.total <= 0.0 {
         return ConeSample {
-            direction: ns,
+            direction: cones.ns,
             pdf: 0.0,
         };
     }
-    let mut left = u[0] * total;
-    let mut chosen = cone_of(frame, 0, position, ns);
-    for i in 0..frame.sphere_count {
-        let cone = cone_of(frame, i, position, ns);
+    let mut left = u[0] * cones.total;
+    let mut chosen = cones.cones[0];
+    for cone in cones.seen() {
         if cone.weight <= 0.0 {
             continue;
         }
         left -= cone.weight;
-        chosen = cone;
+        chosen = *cone;
         if left < 0.0 {
             break;
         }
@@ -113,24 +148,25 @@ pub fn cone_sample(frame: &Frame, position: Vec3, ns: Vec3, u: [f32; 3]) -> Cone
     let direction = tangent * (sin * cos_phi) + bitangent * (sin * sin_phi) + chosen.axis * cos;
     ConeSample {
         direction,
-        pdf: cone_pdf(frame, position, ns, direction),
+        pdf: cone_pdf(cones, direction),
     }
 }
 
 /// Density of [`cone_sample`] in `direction` (unit).
-pub fn cone_pdf(frame: &Frame, position: Vec3, ns: Vec3, direction: Vec3) -> f32 {
-    let mut total = 0.0;
+pub fn cone_pdf(cones: &Cones, direction: Vec3) -> f32 {
     let mut sum = 0.0;
-    for i in 0..frame.sphere_count {
-        let cone = cone_of(frame, i, position, ns);
-        total += cone.weight;
+    for cone in cones.seen() {
         if cone.wide {
-            sum += cone.weight * dot3(direction, ns).max(0.0) * (1.0 / PI);
-        } else if inside(&cone, direction) {
+            sum += cone.weight * dot3(direction, cones.ns).max(0.0) * (1.0 / PI);
+        } else if inside(cone, direction) {
             sum += cone.weight / (2.0 * PI * cone.one_minus_cos);
         }
     }
-    if total > 0.0 { sum / total } else { 0.0 }
+    if cones.total > 0.0 {
+        sum / cones.total
+    } else {
+        0.0
+    }
 }
 
 /// By the cross product, whose relative precision holds for cones of any width.
@@ -140,13 +176,9 @@ fn inside(cone: &Cone, direction: Vec3) -> bool {
         && dot3(across, across) <= cone.sin2 * (1.0 + CONE_PADDING) + CONE_PADDING_SIN2
 }
 
-/// Upper estimate, in 0..1, of the cosine-weighted share of the hemisphere about `ns` that virtual geometry covers.
-pub fn cone_solid_angle_fraction(frame: &Frame, position: Vec3, ns: Vec3) -> f32 {
-    let mut total = 0.0;
-    for i in 0..frame.sphere_count {
-        total += cone_of(frame, i, position, ns).weight;
-    }
-    total.min(1.0)
+/// Upper estimate, in 0..1, of the cosine-weighted share of the hemisphere that virtual geometry covers.
+pub fn cone_solid_angle_fraction(cones: &Cones) -> f32 {
+    cones.total.min(1.0)
 }
 
 /// False only if a ray from `position` cannot meet virtual geometry.

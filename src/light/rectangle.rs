@@ -1,7 +1,9 @@
 //! Rectangular lights by solid angle, after Ureña, Fajardo and King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013,
 //! in a form without their differences of nearly equal angles. WGSL twin: `shaders/rectangle.wgsl`.
 
-use glam::Vec3;
+use std::f32::consts::PI;
+
+use glam::{Vec2, Vec3};
 
 use crate::math::{atan2_, cross3, dot3, length3, safe_sqrt, sincos_2pi};
 use crate::packed::{LIGHT_QUAD, Light};
@@ -10,6 +12,8 @@ use crate::packed::{LIGHT_QUAD, Light};
 const MIN_SOLID_ANGLE: f32 = 0.02;
 /// Largest cosine between the edges of a quad that counts as a rectangle.
 const RIGHT_ANGLE: f32 = 1e-5;
+/// Coordinates are bounded by this many heights: beyond, the solid angle changes by less than 1 / FARTHEST.
+const FARTHEST: f32 = 3e4;
 const INV_TAU: f32 = 0.159_154_94;
 
 /// A rectangle seen from a point, in axes along its edges.
@@ -26,6 +30,8 @@ pub struct Rectangle {
     height: f32,
     /// Steradians; 0 where it is not to be sampled by solid angle.
     pub solid_angle: f32,
+    /// Signed solid angle between the foot of the perpendicular and the side at x0.
+    start: f32,
 }
 
 /// The quad `light` from `position`; `solid_angle` 0 for other lights, oblique quads, the dark side and small solid angles.
@@ -38,9 +44,9 @@ pub fn rectangle_from(light: &Light, position: Vec3) -> Rectangle {
     let ex = axis_u / width;
     let ey = axis_v / depth;
     let ez = cross3(ex, ey);
-    let corner = Vec3::new(light.position[0], light.position[1], light.position[2]) - position;
-    let x0 = dot3(corner, ex);
-    let y0 = dot3(corner, ey);
+    let offset = Vec3::new(light.position[0], light.position[1], light.position[2]) - position;
+    let x0 = dot3(offset, ex);
+    let y0 = dot3(offset, ey);
     let mut r = Rectangle {
         ex,
         ey,
@@ -49,24 +55,43 @@ pub fn rectangle_from(light: &Light, position: Vec3) -> Rectangle {
         x1: x0 + width,
         y0,
         y1: y0 + depth,
-        height: -dot3(corner, ez),
+        height: -dot3(offset, ez),
         solid_angle: 0.0,
+        start: 0.0,
     };
     if light.kind != LIGHT_QUAD || dot3(ex, ey).abs() > RIGHT_ANGLE || r.height <= 0.0 {
         return r;
     }
-    let right = corner_angle(r.x1, r.y1, r.height) - corner_angle(r.x1, r.y0, r.height);
-    let left = corner_angle(r.x0, r.y1, r.height) - corner_angle(r.x0, r.y0, r.height);
-    let solid_angle = right - left;
+    let inv_height = 1.0 / r.height;
+    let (x0, x1) = (in_heights(r.x0, inv_height), in_heights(r.x1, inv_height));
+    let (y0, y1) = (in_heights(r.y0, inv_height), in_heights(r.y1, inv_height));
+    let left = between(corner(x0, y1), corner(x0, y0));
+    let right = between(corner(x1, y1), corner(x1, y0));
+    let whole = between(right, left);
+    let mut solid_angle = atan2_(whole.y, whole.x);
+    if solid_angle < 0.0 {
+        solid_angle += 2.0 * PI;
+    }
     if solid_angle >= MIN_SOLID_ANGLE {
         r.solid_angle = solid_angle;
+        r.start = atan2_(left.y, left.x);
     }
     r
 }
 
-/// Signed solid angle of the rectangle from the foot of the perpendicular to (x, y).
-fn corner_angle(x: f32, y: f32, height: f32) -> f32 {
-    atan2_(x * y, height * safe_sqrt(x * x + y * y + height * height))
+/// Bounded so that the product of four corners does not overflow.
+fn in_heights(x: f32, inv_height: f32) -> f32 {
+    (x * inv_height).clamp(-FARTHEST, FARTHEST)
+}
+
+/// A complex number whose angle is the signed solid angle of the rectangle from the foot of the perpendicular to (x, y), in heights.
+fn corner(x: f32, y: f32) -> Vec2 {
+    Vec2::new(safe_sqrt(x * x + y * y + 1.0), x * y)
+}
+
+/// A complex number whose angle is that of `a` less that of `b`.
+fn between(a: Vec2, b: Vec2) -> Vec2 {
+    Vec2::new(a.x * b.x + a.y * b.y, a.y * b.x - a.x * b.y)
 }
 
 /// Vector from the point to a place on the rectangle, uniform by solid angle.
@@ -75,8 +100,7 @@ pub fn sample_rectangle(r: &Rectangle, u0: f32, u1: f32) -> Vec3 {
     // The strip from x0 to x has the solid angle asin(c p) + asin(c q) - start, c being the sine of x's azimuth about the y axis.
     let p = r.y1 / safe_sqrt(r.y1 * r.y1 + height_squared);
     let q = -r.y0 / safe_sqrt(r.y0 * r.y0 + height_squared);
-    let start = corner_angle(r.x0, r.y1, r.height) - corner_angle(r.x0, r.y0, r.height);
-    let (half_sin, half_cos) = sincos_2pi((start + u0 * r.solid_angle) * (0.5 * INV_TAU));
+    let (half_sin, half_cos) = sincos_2pi((r.start + u0 * r.solid_angle) * (0.5 * INV_TAU));
     // p^2 + q^2 + 2 p q cos of that angle, as whichever sum has no cancellation
     let mut squared = (p + q) * (p + q) - 4.0 * p * q * half_sin * half_sin;
     if p * q > 0.0 {

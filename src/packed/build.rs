@@ -107,13 +107,7 @@ impl PackedScene {
             &mut self.frame,
         );
         let count = scene.camera.width as usize * scene.camera.height as usize;
-        self.pixels = vec![
-            PixelInfo {
-                difference_period: 1,
-                flags: PIXEL_BEAM_MAY_MEET_VIRTUAL
-            };
-            count
-        ];
+        self.pixels = vec![PixelInfo::uniform(PIXEL_BEAM_MAY_MEET_VIRTUAL); count];
         debug_assert!(matches!(
             scene.lens.aperture,
             Aperture::Disc | Aperture::Square | Aperture::Blades(_)

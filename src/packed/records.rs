@@ -210,9 +210,22 @@ pub const PIXEL_OUT_OF_REACH: u32 = 2;
 
 /// What the pilot found out about a pixel before any sample is taken.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct PixelInfo {
     /// Of the samples that miss virtual geometry one in this many, at least 1, evaluates its difference.
     pub difference_period: u32,
+    /// Samples that this pixel takes for every ray per pixel asked for, at least 1.
+    pub sample_factor: u32,
     pub flags: u32,
+}
+
+impl PixelInfo {
+    /// One sample a ray, each evaluating everything.
+    pub const fn uniform(flags: u32) -> Self {
+        Self {
+            difference_period: 1,
+            sample_factor: 1,
+            flags,
+        }
+    }
 }

@@ -122,12 +122,25 @@ impl Renderer {
             notes: Vec::new(),
         };
         renderer.prepare_photo();
-        renderer.packed.pixels = cpu::pilot(&renderer.packed);
+        renderer.look_ahead();
         renderer.seconds.build = start.elapsed().as_secs_f64();
         let start = Instant::now();
         renderer.backend = renderer.open_backend()?;
         renderer.seconds.compile = start.elapsed().as_secs_f64();
         Ok(renderer)
+    }
+
+    /// Runs the pilot and begins the film that follows its plan.
+    fn look_ahead(&mut self) {
+        cpu::pilot(&mut self.packed);
+        self.film = Film::new(
+            self.film.width,
+            self.film.height,
+            self.film.first_sample,
+            self.options.all_planes,
+        );
+        let factors = self.packed.pixels.iter().map(|p| p.sample_factor);
+        self.film.set_sample_factors(factors);
     }
 
     fn open_backend(&mut self) -> Result<Backend, RenderError> {
@@ -336,13 +349,7 @@ impl Renderer {
         if real_light_changed {
             self.prepare_photo();
         }
-        self.packed.pixels = cpu::pilot(&self.packed);
-        self.film = Film::new(
-            self.film.width,
-            self.film.height,
-            self.film.first_sample,
-            self.options.all_planes,
-        );
+        self.look_ahead();
         if let Backend::Gpu(gpu) = &mut self.backend {
             gpu.set_scene(&self.packed)?;
         }
@@ -383,7 +390,7 @@ impl Renderer {
             .zip(&self.packed.pixels)
             .filter(|(_, info)| info.flags & PIXEL_OUT_OF_REACH == 0);
         within_reach
-            .map(|(sums, _)| sums.n)
+            .map(|(sums, info)| sums.n / info.sample_factor)
             .min()
             .unwrap_or(self.end_sample - self.film.first_sample)
     }

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::{Random, fit, pearson};
 use crate::light::cones::{
-    cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
+    Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
 };
 use crate::packed::Frame;
 
@@ -49,12 +49,15 @@ fn samples_follow_the_mixture() {
         let frame = frame(&spheres);
         let mut random = Random::new(21);
         let mut draw = || {
-            let s = cone_sample(&frame, Vec3::ZERO, n, random.uniforms());
+            let s = cone_sample(&Cones::at(&frame, Vec3::ZERO, n), random.uniforms());
             assert!(s.pdf > 0.0 && (s.direction.length() - 1.0).abs() < 1e-6);
-            assert_eq!(s.pdf, cone_pdf(&frame, Vec3::ZERO, n, s.direction));
+            assert_eq!(
+                s.pdf,
+                cone_pdf(&Cones::at(&frame, Vec3::ZERO, n), s.direction)
+            );
             Some(s.direction)
         };
-        let pdf = |d: Vec3| f64::from(cone_pdf(&frame, Vec3::ZERO, n, d));
+        let pdf = |d: Vec3| f64::from(cone_pdf(&Cones::at(&frame, Vec3::ZERO, n), d));
         let result = fit(100_000, &mut draw, pdf);
         assert!(
             (result.integral - 1.0).abs() < 0.01,
@@ -89,7 +92,7 @@ fn tiny_cones_keep_their_distribution() {
         let mut random = Random::new(22);
         let mut counts = vec![0.0; 64];
         for _ in 0..64_000 {
-            let s = cone_sample(&frame, Vec3::ZERO, Vec3::Y, random.uniforms());
+            let s = cone_sample(&Cones::at(&frame, Vec3::ZERO, Vec3::Y), random.uniforms());
             let want = 1.0 / (TAU * one_minus_cos);
             assert!(
                 (f64::from(s.pdf) / want - 1.0).abs() < 1e-4,
@@ -128,7 +131,7 @@ fn a_sphere_covers_its_form_factor() {
         let n = 200_000;
         let mut sum = 0.0;
         for _ in 0..n {
-            let s = cone_sample(&frame, Vec3::ZERO, Vec3::Y, random.uniforms());
+            let s = cone_sample(&Cones::at(&frame, Vec3::ZERO, Vec3::Y), random.uniforms());
             let d = s.direction.as_dvec3();
             let c = DVec3::new(side.into(), height.into(), 0.0);
             let inside = d.cross(c).length() < f64::from(radius) && d.dot(c) > 0.0;
@@ -140,7 +143,11 @@ fn a_sphere_covers_its_form_factor() {
         let want = PI * (f64::from(radius) / distance).powi(2) * f64::from(height) / distance;
         assert!((sum / want - 1.0).abs() < 0.01, "{sum} {want}");
         assert!((sum / (want * 1.03) - 1.0).abs() > 0.01);
-        let fraction = f64::from(cone_solid_angle_fraction(&frame, Vec3::ZERO, Vec3::Y));
+        let fraction = f64::from(cone_solid_angle_fraction(&Cones::at(
+            &frame,
+            Vec3::ZERO,
+            Vec3::Y,
+        )));
         assert!(fraction >= want / PI && fraction <= 1.0, "{fraction}");
     }
 }
@@ -149,14 +156,17 @@ fn a_sphere_covers_its_form_factor() {
 fn only_cones_that_reach_above_the_horizon_count() {
     let above = |y: f32| {
         let frame = frame(&[[5.0, y, 0.0, 1.0]]);
-        cone_sample(&frame, Vec3::ZERO, Vec3::Y, [0.5; 3]).pdf > 0.0
+        cone_sample(&Cones::at(&frame, Vec3::ZERO, Vec3::Y), [0.5; 3]).pdf > 0.0
     };
     assert!(above(0.5) && above(-0.999) && !above(-1.01));
     assert_eq!(
-        cone_sample(&frame(&[]), Vec3::ZERO, Vec3::Y, [0.5; 3]).pdf,
+        cone_sample(&Cones::at(&frame(&[]), Vec3::ZERO, Vec3::Y), [0.5; 3]).pdf,
         0.0
     );
-    assert_eq!(cone_pdf(&frame(&[]), Vec3::ZERO, Vec3::Y, Vec3::Y), 0.0);
+    assert_eq!(
+        cone_pdf(&Cones::at(&frame(&[]), Vec3::ZERO, Vec3::Y), Vec3::Y),
+        0.0
+    );
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::{Random, lit_by, map_environment};
 use crate::gpu::harness::{Probe, test_device};
 use crate::gpu::{Features, SceneBuffers, SceneParts};
 use crate::light::cones::{
-    cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
+    Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
 };
 use crate::light::environment::env_radiance;
 use crate::light::lights::{env_pdf, light_pdf_hit, light_sample, light_select};
@@ -45,7 +45,7 @@ fn on_the_cpu(scene: &PackedScene, input: &[f32]) -> [f32; OUTPUTS] {
     let u = [input[6], input[7], input[8], input[9]];
     let frame = &scene.frame;
     let s = light_sample(scene, position, u);
-    let c = cone_sample(frame, position, direction, [u[0], u[1], u[2]]);
+    let c = cone_sample(&Cones::at(frame, position, direction), [u[0], u[1], u[2]]);
     let radiance = env_radiance(scene, direction);
     let light = light_select(scene, u[0], u[3]);
     [
@@ -65,8 +65,8 @@ fn on_the_cpu(scene: &PackedScene, input: &[f32]) -> [f32; OUTPUTS] {
         c.direction.y,
         c.direction.z,
         c.pdf,
-        cone_pdf(frame, position, direction, s.direction),
-        cone_solid_angle_fraction(frame, position, direction),
+        cone_pdf(&Cones::at(frame, position, direction), s.direction),
+        cone_solid_angle_fraction(&Cones::at(frame, position, direction)),
         if direction_meets_spheres(frame, position, direction) {
             1.0
         } else {

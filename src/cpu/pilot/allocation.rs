@@ -1,0 +1,157 @@
+//! Where work lowers the error most: how often each block's samples are taken and their differences evaluated.
+//!
+//! A sample of squared error e that costs c and is taken m times a ray per pixel (m below 1: in turns) leaves the error e / m for the cost m c. For
+//! a given total error the total cost is least where m is proportional to the root of e / c (Neyman 1934, with costs).
+
+use super::blocks::Blocks;
+use super::measurement::{BlockMoments, Moments};
+use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
+
+/// Squared error aimed at, relative to that of one sample a ray everywhere.
+const ERROR_SHARE: f32 = 0.5;
+/// A difference is evaluated at one ray in this many at the least; a pixel takes this many samples a ray at the most.
+const LONGEST_PERIOD: f32 = 16.0;
+const LARGEST_FACTOR: f32 = 16.0;
+/// Blocks to either side whose samples make one estimate, and those that an estimate leans on, with the weight of this many pixels.
+const NEAR_BLOCKS: usize = 1;
+const WIDE_BLOCKS: usize = 5;
+const WIDE_WEIGHT: f32 = 8.0;
+/// What geometry tells is believed this far: at least this times the importance is evaluated.
+const IMPORTANCE_SHARE: f32 = 0.25;
+
+/// Samples for each ray per pixel in a block, 1 being one a ray: of differences, and of pixels that virtual geometry may cover.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rates {
+    pub difference: f32,
+    pub mixed: f32,
+}
+
+impl Rates {
+    /// Without measurements: the importance alone decides.
+    pub fn from_importance(importance: f32) -> Self {
+        Self {
+            difference: importance.clamp(1.0 / LONGEST_PERIOD, 1.0),
+            mixed: 1.0,
+        }
+    }
+
+    /// The plan of a pixel.
+    pub fn pixel(self, flags: u32) -> PixelInfo {
+        let mut factor = self.difference;
+        if flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0 {
+            factor = factor.max(self.mixed);
+        }
+        let factor = factor.round().max(1.0);
+        PixelInfo {
+            difference_period: (factor / self.difference).round().max(1.0) as u32,
+            sample_factor: factor as u32,
+            flags,
+        }
+    }
+}
+
+/// What is known of a block once its neighbours have been asked.
+struct Expected {
+    /// Share of the block's samples that meet virtual geometry.
+    mixed_share: f32,
+    difference: Moments,
+    mixed: Moments,
+    least_difference_rate: f32,
+}
+
+impl Expected {
+    fn rates(&self, gain: f32) -> Rates {
+        let rate = |m: &Moments| gain * (m.error / m.cost).sqrt();
+        Rates {
+            difference: rate(&self.difference).clamp(self.least_difference_rate, LARGEST_FACTOR),
+            mixed: rate(&self.mixed).clamp(1.0, LARGEST_FACTOR),
+        }
+    }
+
+    fn mean(&self, difference: f32, mixed: f32) -> f32 {
+        (1.0 - self.mixed_share) * difference + self.mixed_share * mixed
+    }
+}
+
+/// The rates of each block: the wanted error at least cost, but not more samples in all than one a ray.
+pub fn allocate(blocks: &Blocks, measured: &[BlockMoments], importance: &[f32]) -> Vec<Rates> {
+    let difference: Vec<Moments> = measured.iter().map(|m| m.difference).collect();
+    let mixed: Vec<Moments> = measured.iter().map(|m| m.mixed).collect();
+    let difference = smooth(blocks, &difference);
+    let mixed = smooth(blocks, &mixed);
+    let expected: Vec<Expected> = measured
+        .iter()
+        .zip(difference.into_iter().zip(mixed))
+        .zip(importance)
+        .map(|((m, (difference, mixed)), importance)| Expected {
+            mixed_share: m.mixed.pixels / (m.mixed.pixels + m.difference.pixels).max(1.0),
+            difference,
+            mixed,
+            least_difference_rate: (IMPORTANCE_SHARE * importance).clamp(1.0 / LONGEST_PERIOD, 1.0),
+        })
+        .collect();
+    let error_of_one: f32 = expected
+        .iter()
+        .map(|e| e.mean(e.difference.error, e.mixed.error))
+        .sum();
+    let is_enough = |gain: f32| {
+        let mut error = 0.0;
+        let mut samples = 0.0;
+        for e in &expected {
+            let rates = e.rates(gain);
+            error += e.mean(
+                e.difference.error / rates.difference,
+                e.mixed.error / rates.mixed,
+            );
+            samples += e.mean(rates.difference, rates.mixed);
+        }
+        error <= ERROR_SHARE * error_of_one || samples >= expected.len() as f32
+    };
+    let gain = least_gain(is_enough);
+    expected.iter().map(|e| e.rates(gain)).collect()
+}
+
+/// Smallest gain that is enough, within a thousandth: rates and their effect rise with it.
+fn least_gain(is_enough: impl Fn(f32) -> bool) -> f32 {
+    let (mut low, mut high) = (1e-6_f32, 1e9_f32);
+    while high > low * 1.001 {
+        let middle = (low * high).sqrt();
+        if is_enough(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    high
+}
+
+/// Means over each block's neighbourhood; where nothing was sampled, no error at a cost of 1.
+fn smooth(blocks: &Blocks, moments: &[Moments]) -> Vec<Moments> {
+    let sum = |block, radius| {
+        blocks.gather(moments, block, radius, Moments::default(), |mut a, b| {
+            a += b;
+            a
+        })
+    };
+    (0..blocks.count())
+        .map(|block| {
+            let near = sum(block, NEAR_BLOCKS);
+            let wide = sum(block, WIDE_BLOCKS);
+            if wide.pixels == 0.0 {
+                return Moments {
+                    pixels: 0.0,
+                    error: 0.0,
+                    cost: 1.0,
+                };
+            }
+            let lean = WIDE_WEIGHT / wide.pixels;
+            let weight = 1.0 / (near.pixels + WIDE_WEIGHT);
+            let mean = |near: f32, wide: f32| (near + lean * wide) * weight;
+            Moments {
+                pixels: 1.0,
+                error: mean(near.error, wide.error),
+                cost: mean(near.cost, wide.cost),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,78 @@
+//! The picture in square blocks of pixels, the pilot's resolution.
+
+/// Pixels along a block's side.
+const SIDE_PX: usize = 4;
+
+pub struct Blocks {
+    width: usize,
+    height: usize,
+    columns: usize,
+    rows: usize,
+}
+
+impl Blocks {
+    pub fn of(width: usize, height: usize) -> Self {
+        Self {
+            width,
+            height,
+            columns: width.div_ceil(SIDE_PX),
+            rows: height.div_ceil(SIDE_PX),
+        }
+    }
+
+    pub fn count(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// Block of a pixel.
+    pub fn of_pixel(&self, pixel: usize) -> usize {
+        (pixel / self.width / SIDE_PX) * self.columns + pixel % self.width / SIDE_PX
+    }
+
+    /// Pixels of a block, those outside the picture left out.
+    pub fn pixels(&self, block: usize) -> impl Iterator<Item = usize> + use<> {
+        let (x0, y0) = self.corner(block);
+        let width = self.width;
+        let (x1, y1) = (
+            (x0 + SIDE_PX).min(self.width),
+            (y0 + SIDE_PX).min(self.height),
+        );
+        (y0..y1).flat_map(move |y| (x0..x1).map(move |x| y * width + x))
+    }
+
+    /// One pixel of a block, chosen by 32 random bits.
+    pub fn pixel(&self, block: usize, random: u32) -> usize {
+        let (x0, y0) = self.corner(block);
+        let columns = SIDE_PX.min(self.width - x0);
+        let rows = SIDE_PX.min(self.height - y0);
+        let x = x0 + (random & 0xffff) as usize % columns;
+        let y = y0 + (random >> 16) as usize % rows;
+        y * self.width + x
+    }
+
+    fn corner(&self, block: usize) -> (usize, usize) {
+        (
+            block % self.columns * SIDE_PX,
+            block / self.columns * SIDE_PX,
+        )
+    }
+
+    /// Folds the values of the blocks at most `radius` blocks away in either direction.
+    pub fn gather<T: Copy, A>(
+        &self,
+        values: &[T],
+        block: usize,
+        radius: usize,
+        start: A,
+        fold: impl Fn(A, T) -> A,
+    ) -> A {
+        let (column, row) = (block % self.columns, block / self.columns);
+        let mut sum = start;
+        for r in row.saturating_sub(radius)..(row + radius + 1).min(self.rows) {
+            for c in column.saturating_sub(radius)..(column + radius + 1).min(self.columns) {
+                sum = fold(sum, values[r * self.columns + c]);
+            }
+        }
+        sum
+    }
+}

@@ -1,0 +1,108 @@
+//! A look at the picture before the first sample: which beams can meet virtual geometry, which pixels nothing virtual can reach, and how often
+//! each pixel's samples are worth an evaluation.
+//!
+//! The two flags are proven. How often steers work, not the result: whatever is evaluated counts for what is not, and the pilot's own
+//! samples are not used again.
+
+mod allocation;
+mod beam;
+mod blocks;
+mod importance;
+mod measurement;
+
+use rayon::prelude::*;
+
+use allocation::{Rates, allocate};
+use beam::Beam;
+use blocks::Blocks;
+use importance::{PilotLights, importance};
+
+use super::contribution::ESTIMATOR_PAPER;
+use crate::packed::{
+    FRAME_AOVS, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene, PixelInfo,
+};
+
+/// Fewer rays per pixel than this are not worth a measurement.
+const MIN_RAYS_TO_MEASURE: u32 = 8;
+/// Seed of the pilot's own samples, which no render's samples should equal.
+const SEED: u32 = 0x9d2c_5681;
+
+/// Fills `scene.pixels`. The same for every seed, sample range and backend.
+pub fn pilot(scene: &mut PackedScene) {
+    let (width, height) = (scene.frame.width as usize, scene.frame.height as usize);
+    let nothing_virtual =
+        scene.frame.sphere_count == 0 && !scene.lights.iter().any(|l| l.side == 1);
+    if nothing_virtual {
+        scene.pixels = vec![PixelInfo::uniform(PIXEL_OUT_OF_REACH); width * height];
+        return;
+    }
+    let pinhole = Frame {
+        aperture_radius: 0.0,
+        ..scene.frame
+    };
+    let flags: Vec<u32> = (0..width * height)
+        .into_par_iter()
+        .map(|i| flags_of(scene, &Beam::of_pixel(&scene.frame, &pinhole, i as u32)))
+        .collect();
+    if scene.frame.estimator == ESTIMATOR_PAPER {
+        scene.pixels = flags.into_iter().map(PixelInfo::uniform).collect();
+        return;
+    }
+    let blocks = Blocks::of(width, height);
+    let lights = PilotLights::of(scene);
+    let importances: Vec<f32> = (0..blocks.count())
+        .into_par_iter()
+        .map(|block| {
+            let pixel = blocks.pixel(block, 0) as u32;
+            importance(
+                scene,
+                &Beam::of_pixel(&scene.frame, &pinhole, pixel),
+                &lights,
+            )
+        })
+        .collect();
+    // A lens beam must not jump off the map at an edge.
+    let importances: Vec<f32> = (0..blocks.count())
+        .map(|block| blocks.gather(&importances, block, 1, 0.0, f32::max))
+        .collect();
+    let rates: Vec<Rates> = if scene.frame.rays_total < MIN_RAYS_TO_MEASURE {
+        importances
+            .iter()
+            .map(|&importance| Rates::from_importance(importance))
+            .collect()
+    } else {
+        allocate(&blocks, &measure(scene, &blocks, &flags), &importances)
+    };
+    scene.pixels = flags
+        .into_iter()
+        .enumerate()
+        .map(|(pixel, flags)| rates[blocks.of_pixel(pixel)].pixel(flags))
+        .collect();
+}
+
+fn flags_of(scene: &PackedScene, beam: &Beam) -> u32 {
+    if beam.may_meet_spheres(&scene.frame) {
+        PIXEL_BEAM_MAY_MEET_VIRTUAL
+    } else if beam.may_meet_real(scene) {
+        0
+    } else {
+        PIXEL_OUT_OF_REACH
+    }
+}
+
+fn measure(
+    scene: &mut PackedScene,
+    blocks: &Blocks,
+    flags: &[u32],
+) -> Vec<measurement::BlockMoments> {
+    let frame = scene.frame;
+    scene.frame.seed = SEED;
+    scene.frame.flags &= !FRAME_AOVS;
+    scene.pixels = flags.iter().copied().map(PixelInfo::uniform).collect();
+    let measured = measurement::measure(scene, blocks);
+    scene.frame = frame;
+    measured
+}
+
+#[cfg(test)]
+mod tests;

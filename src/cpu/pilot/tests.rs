@@ -1,0 +1,123 @@
+//! What the plan promises: least cost for the wanted error, no more samples than asked for, and never a pixel without a chance.
+
+use super::allocation::{Rates, allocate};
+use super::blocks::Blocks;
+use super::measurement::{BlockMoments, Moments};
+use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
+
+/// Blocks of a picture in vertical bands, each of one squared error, wide enough that most blocks have equals for neighbours.
+const COLUMNS_PER_BAND: usize = 24;
+const ROWS: usize = 24;
+
+fn bands(errors: &[f32], costs: &[f32]) -> (Blocks, Vec<BlockMoments>) {
+    let columns = COLUMNS_PER_BAND * errors.len();
+    let blocks = Blocks::of(4 * columns, 4 * ROWS);
+    let moments = (0..blocks.count())
+        .map(|block| {
+            let band = block % columns / COLUMNS_PER_BAND;
+            BlockMoments {
+                difference: Moments {
+                    pixels: 1.0,
+                    error: errors[band],
+                    cost: costs[band],
+                },
+                mixed: Moments::default(),
+            }
+        })
+        .collect();
+    (blocks, moments)
+}
+
+/// The rate in the middle of each band.
+fn middles(rates: &[Rates], bands: usize) -> Vec<f32> {
+    let columns = COLUMNS_PER_BAND * bands;
+    (0..bands)
+        .map(|band| {
+            rates[ROWS / 2 * columns + band * COLUMNS_PER_BAND + COLUMNS_PER_BAND / 2].difference
+        })
+        .collect()
+}
+
+#[test]
+fn rates_follow_the_root_of_error_over_cost() {
+    let (blocks, moments) = bands(&[1.0, 0.04, 0.16], &[4.0, 4.0, 16.0]);
+    let rates = allocate(&blocks, &moments, &vec![0.0; blocks.count()]);
+    let [a, b, c] = middles(&rates, 3)[..] else {
+        panic!("three bands")
+    };
+    assert!((a / b - 5.0).abs() < 0.05, "{a} {b}");
+    assert!((a / c - 5.0).abs() < 0.05, "{a} {c}");
+    // Control: equal errors at equal costs are equal.
+    let (blocks, moments) = bands(&[0.3, 0.3], &[4.0, 4.0]);
+    let rates = allocate(&blocks, &moments, &vec![0.0; blocks.count()]);
+    let [a, b] = middles(&rates, 2)[..] else {
+        panic!("two bands")
+    };
+    assert!((a - b).abs() < 1e-4, "{a} {b}");
+}
+
+/// Where the error is even nothing can be saved: as many samples as were asked for, not more.
+#[test]
+fn no_more_samples_than_asked_for() {
+    let (blocks, moments) = bands(&[0.3], &[4.0]);
+    let rates = allocate(&blocks, &moments, &vec![0.0; blocks.count()]);
+    for rate in &rates {
+        assert!((rate.difference - 1.0).abs() < 2e-3, "{rate:?}");
+    }
+    let (blocks, moments) = bands(&[1.0, 1e-3, 1e-3, 1e-3], &[4.0; 4]);
+    let rates = allocate(&blocks, &moments, &vec![0.0; blocks.count()]);
+    let mean = rates.iter().map(|r| r.difference).sum::<f32>() / rates.len() as f32;
+    assert!(mean < 0.8, "uneven errors save work: {mean}");
+}
+
+#[test]
+fn the_error_aimed_at_is_met_at_less_cost_than_evenly() {
+    let errors = [1.0, 0.01];
+    let (blocks, moments) = bands(&errors, &[4.0, 4.0]);
+    let rates = allocate(&blocks, &moments, &vec![0.0; blocks.count()]);
+    let predicted: f32 = moments
+        .iter()
+        .zip(&rates)
+        .map(|(m, r)| m.difference.error / r.difference)
+        .sum();
+    let even: f32 = moments.iter().map(|m| m.difference.error).sum();
+    let spent: f32 = rates.iter().map(|r| r.difference).sum::<f32>() / rates.len() as f32;
+    // Even rates of that spending would leave more.
+    assert!(predicted < 0.7 * even / spent, "{predicted} {even} {spent}");
+}
+
+#[test]
+fn what_geometry_warns_of_is_sampled_though_nothing_was_measured() {
+    let (blocks, moments) = bands(&[1.0, 0.0], &[4.0, 4.0]);
+    let importance = vec![1.0; blocks.count()];
+    let warned = middles(&allocate(&blocks, &moments, &importance), 2);
+    let silent = middles(&allocate(&blocks, &moments, &vec![0.0; blocks.count()]), 2);
+    assert!(warned[1] >= 0.25, "{warned:?}");
+    assert!(silent[1] < 0.1, "control: {silent:?}");
+    assert!(
+        silent[1] >= 1.0 / 16.0,
+        "never without a chance: {silent:?}"
+    );
+}
+
+/// Turns and factor of a pixel multiply to the rate; only beams that may meet virtual geometry follow its rate.
+#[test]
+fn a_pixels_plan_is_its_rate() {
+    let rates = Rates {
+        difference: 0.25,
+        mixed: 3.0,
+    };
+    let expect = |difference_period, sample_factor, flags| PixelInfo {
+        difference_period,
+        sample_factor,
+        flags,
+    };
+    assert_eq!(rates.pixel(0), expect(4, 1, 0));
+    let near = PIXEL_BEAM_MAY_MEET_VIRTUAL;
+    assert_eq!(rates.pixel(near), expect(12, 3, near));
+    let bright = Rates {
+        difference: 4.2,
+        mixed: 1.0,
+    };
+    assert_eq!(bright.pixel(0), expect(1, 4, 0));
+}
