@@ -10,14 +10,16 @@
 //! With u = 2^-24 the test computes sheared coordinates whose error is at most 5u times the hit's offset from the origin on that axis plus
 //! 10u times the triangle's largest extent, and the distance of a point of the triangle, off by at most 5u times the distance plus 5u times
 //! the extent. Each triangle's box is therefore enlarged by at least 16u times its extent (`binary`), and box distances, themselves off by
-//! 3u, are compared with a margin of 16u (`trace`). The GPU adds the error of its decompression (`compressed`). Which point of the triangle
+//! 4u, are compared with a margin of 16u (`trace`). The GPU adds the error of its decompression (`compressed`). Which point of the triangle
 //! that is depends on the weights, which are as good as the triangle is wide: for slivers, distances err by u times extent squared over width.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod binary;
 mod compressed;
+mod large_pages;
 mod spheres;
+mod stack;
 mod trace;
 mod wide;
 
@@ -156,19 +158,23 @@ impl WorldBvh {
     }
 
     /// The nearest hit; of several at the same distance the smallest triangle id. A ray with a coordinate that is not finite misses.
+    #[inline]
     pub fn closest(&self, ray: &Ray) -> Hit {
         self.closest_by(self.kernel, ray)
     }
 
     /// Whether anything is hit.
+    #[inline]
     pub fn any(&self, ray: &Ray) -> bool {
         self.any_by(self.kernel, ray)
     }
 
+    #[inline]
     fn closest_by(&self, kernel: Kernel, ray: &Ray) -> Hit {
         trace::closest(&self.wide, kernel, ray)
     }
 
+    #[inline]
     fn any_by(&self, kernel: Kernel, ray: &Ray) -> bool {
         trace::any(&self.wide, kernel, ray)
     }

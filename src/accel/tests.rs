@@ -5,11 +5,7 @@ use super::trace::Kernel;
 use super::*;
 
 fn kernels() -> Vec<Kernel> {
-    let mut kernels = vec![Kernel::Portable];
-    if Kernel::best() != Kernel::Portable {
-        kernels.push(Kernel::best());
-    }
-    kernels
+    Kernel::supported().collect()
 }
 
 /// Random rays about a box of half-size `scale` around `center`: along axes, at random, towards the box; some with an interval.

@@ -1,8 +1,6 @@
 //! Traversal of the CPU's tree and the triangle test. Twin of `shaders/trace.wgsl`: the triangle test there does the same f32 operations.
 
-use std::cell::RefCell;
-
-use super::wide::{Eight, MAX_LEVELS, TriangleBlock, WideBvh, WideNode};
+use super::wide::{Eight, TriangleBlock, WideBvh, WideNode};
 use super::{Hit, Ray};
 
 /// Factor by which a box may be farther than a hit: 16 units of rounding (see the module's proof).
@@ -17,64 +15,64 @@ pub(super) enum Kernel {
     Portable,
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
 }
 
 impl Kernel {
-    /// The fastest that this processor has.
-    pub(super) fn best() -> Kernel {
+    /// All there are, the slowest first.
+    const ALL: &[Kernel] = &[
+        Kernel::Portable,
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("fma")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("lzcnt")
-            && is_x86_feature_detected!("popcnt")
-        {
-            return Kernel::Avx2;
-        }
-        Kernel::Portable
+        Kernel::Avx2,
+        #[cfg(target_arch = "x86_64")]
+        Kernel::Avx512,
+    ];
+
+    /// Those that this processor can run, the slowest first.
+    pub(super) fn supported() -> impl DoubleEndedIterator<Item = Kernel> {
+        Kernel::ALL.iter().copied().filter(|kernel| match kernel {
+            Kernel::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Avx2 => super::avx2::has_avx2(),
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Avx512 => super::avx2::has_avx512(),
+        })
+    }
+
+    /// The fastest that this processor can run.
+    pub(super) fn best() -> Kernel {
+        Kernel::supported().next_back().unwrap_or(Kernel::Portable)
     }
 }
 
-/// What the traversal needs to know of a ray.
-pub(super) struct RayFrame {
-    pub(super) origin: [f32; 3],
-    pub(super) inv_direction: [f32; 3],
+/// What the portable traversal needs to know of a ray.
+struct RayFrame {
+    origin: [f32; 3],
+    inv_direction: [f32; 3],
+    /// The same, larger by the box margin.
+    exit_inv_direction: [f32; 3],
     /// By axis: 0 if the low planes are nearer, 1 if the high ones are.
-    pub(super) near_side: [usize; 3],
+    near_side: [usize; 3],
     /// Axis permutation: the last one is the direction's largest component.
-    pub(super) axes: [usize; 3],
+    axes: [usize; 3],
     /// Shear that takes the direction to the last axis, and the scale along it.
-    pub(super) shear: [f32; 3],
-    pub(super) t_min: f32,
-    pub(super) t_max: f32,
-    skip: u32,
+    shear: [f32; 3],
+    t_min: f32,
 }
 
 impl RayFrame {
-    /// `None` for a ray that hits nothing whatever there is: not finite, without direction or with an empty interval.
     #[inline]
-    fn new(ray: &Ray) -> Option<RayFrame> {
-        let origin = ray.origin.to_array();
+    fn new(ray: &Ray, largest: usize) -> RayFrame {
         // -0 + 0 is +0, so that both zeros take the same inverse.
         let direction = ray.direction.to_array().map(|d| d + 0.0);
-        let sound = ray.origin.is_finite() && ray.direction.is_finite() && ray.t_min < ray.t_max;
-        let magnitude = direction.map(f32::abs);
-        let largest = if magnitude[0] > magnitude[1] {
-            if magnitude[0] > magnitude[2] { 0 } else { 2 }
-        } else if magnitude[1] > magnitude[2] {
-            1
-        } else {
-            2
-        };
-        if !sound || magnitude[largest] == 0.0 {
-            return None;
-        }
         let axes = [(largest + 1) % 3, (largest + 2) % 3, largest];
         let inv_direction = direction.map(|d| 1.0 / d);
         let scale = inv_direction[largest];
-        Some(RayFrame {
-            origin,
+        RayFrame {
+            origin: ray.origin.to_array(),
             inv_direction,
+            exit_inv_direction: inv_direction.map(|inverse| inverse * BOX_MARGIN),
             near_side: direction.map(|d| usize::from(d < 0.0)),
             axes,
             shear: [
@@ -82,12 +80,35 @@ impl RayFrame {
                 direction[axes[1]] * scale,
                 scale,
             ],
-            // Without a sign, so that the bits of distances sort as they do.
-            t_min: ray.t_min + 0.0,
-            t_max: ray.t_max,
-            skip: ray.skip,
-        })
+            t_min: start(ray),
+        }
     }
+}
+
+/// Whether the ray can hit anything: finite, with an interval that is not empty.
+#[inline(always)]
+pub(super) fn is_sound(ray: &Ray, largest: usize) -> bool {
+    let zero = |v: f32| v * 0.0;
+    let [ox, oy, oz] = ray.origin.to_array();
+    let [dx, dy, dz] = ray.direction.to_array();
+    // Zero unless one of them is infinite or NaN.
+    let sum = (zero(ox) + zero(oy)) + (zero(oz) + zero(dx)) + (zero(dy) + zero(dz));
+    let length: &[f32; 3] = ray.direction.as_ref();
+    (sum == 0.0) & (ray.t_min < ray.t_max) & (length[largest] != 0.0)
+}
+
+/// The axis along which the direction is longest, without branches: rays in random order would have the processor guess.
+#[inline(always)]
+pub(super) fn largest_axis(ray: &Ray) -> usize {
+    let [x, y, z] = ray.direction.to_array().map(|d| d.to_bits() & 0x7fff_ffff);
+    let first = usize::from(x <= y);
+    if x.max(y) > z { first } else { 2 }
+}
+
+/// `t_min` without a sign, so that the bits of distances sort as they do.
+#[inline(always)]
+pub(super) fn start(ray: &Ray) -> f32 {
+    ray.t_min + 0.0
 }
 
 /// The nearest accepted triangle so far.
@@ -101,9 +122,10 @@ pub(super) struct Found {
 }
 
 impl Found {
-    fn none(frame: &RayFrame) -> Found {
+    #[inline(always)]
+    pub(super) fn none(ray: &Ray) -> Found {
         Found {
-            t: frame.t_max,
+            t: ray.t_max,
             // No id is smaller: a hit at exactly t_max is not accepted.
             id: 0,
             weights: [0.0; 2],
@@ -112,37 +134,33 @@ impl Found {
     }
 
     #[inline(always)]
-    pub(super) fn accepts(&self, frame: &RayFrame, t: f32, id: u32) -> bool {
-        (t > frame.t_min || (t == frame.t_min && id > frame.skip))
+    pub(super) fn accepts(&self, ray: &Ray, t: f32, id: u32) -> bool {
+        (t > ray.t_min || (t == ray.t_min && id > ray.skip))
             && (t < self.t || (t == self.t && id < self.id))
     }
 }
 
-/// Children that wait: bits of the distance << 32 | child word.
-pub(super) type Stack = [u64; 7 * MAX_LEVELS + 1];
-
-thread_local! {
-    // Kept between rays, because clearing it would cost more than many of them.
-    static STACK: RefCell<Stack> = const { RefCell::new([0; 7 * MAX_LEVELS + 1]) };
-}
-
-/// Defines a traversal `fn NAME<const ANY: bool>(&WideBvh, &RayFrame, Found, &mut Stack) -> Found`.
+/// Defines a traversal `fn NAME<const ANY: bool>(&WideBvh, &Ray) -> Found`.
 ///
-/// `$boxes(node, lanes, limit)` returns the mask of children entered before `limit` and their distances; `$block(block, lanes, limit)` the
-/// mask of triangles hit in [t_min, limit], their distances and the weights of their second and third vertices; `$lanes` makes the vector form of a ray; `$prefetch(tree, child)` may
-/// fetch a child that waits.
+/// `$lanes` makes the vector form of a ray, none for a ray that cannot hit; `$boxes(node, lanes, limit)` returns the mask of children
+/// entered before `limit` and their distances; `$block(block, lanes, limit)` the mask of triangles hit in [t_min, limit], their distances
+/// and the weights of their second and third vertices; `$prefetch(tree, child)` may fetch a child that waits.
 macro_rules! traversal {
     ($(#[$attribute:meta])* fn $name:ident($lanes:path, $boxes:path, $block:path, $prefetch:path)) => {
         $(#[$attribute])*
         fn $name<const ANY: bool>(
             tree: &$crate::accel::wide::WideBvh,
-            frame: &$crate::accel::trace::RayFrame,
-            mut found: $crate::accel::trace::Found,
-            stack: &mut $crate::accel::trace::Stack,
+            ray: &$crate::accel::Ray,
         ) -> $crate::accel::trace::Found {
-            use $crate::accel::{trace::BOX_MARGIN, wide::LEAF};
-            let lanes = $lanes(frame);
-            let mut waiting = 0;
+            use $crate::accel::{stack::{Stack, UNUSED}, trace::{BOX_MARGIN, Found, is_sound, largest_axis}, wide::LEAF};
+            let mut found = Found::none(ray);
+            let largest = largest_axis(ray);
+            if !is_sound(ray, largest) {
+                return found;
+            }
+            let lanes = $lanes(ray, largest);
+            let mut storage = UNUSED;
+            let mut stack = Stack::new(&mut storage);
             let mut child = 0u32;
             loop {
                 if child & LEAF == 0 {
@@ -153,6 +171,19 @@ macro_rules! traversal {
                         mask &= mask - 1;
                         if mask == 0 {
                             child = node.children[lane];
+                            continue;
+                        }
+                        // Near the root boxes lie one behind the other, and the nearest should come first. Deeper they lie side by
+                        // side, and whether anything is hit depends so little on the order that comparing them does not pay.
+                        if ANY && !stack.is_empty() {
+                            child = node.children[lane];
+                            while mask != 0 {
+                                lane = mask.trailing_zeros() as usize & 7;
+                                mask &= mask - 1;
+                                let other = node.children[lane];
+                                $prefetch(tree, other);
+                                stack.push(u64::from(other));
+                            }
                             continue;
                         }
                         let entry = |lane: usize| {
@@ -166,8 +197,7 @@ macro_rules! traversal {
                             let farther = nearest.max(other);
                             nearest = nearest.min(other);
                             $prefetch(tree, farther as u32);
-                            stack[waiting] = farther;
-                            waiting += 1;
+                            stack.push(farther);
                         }
                         child = nearest as u32;
                         continue;
@@ -181,7 +211,7 @@ macro_rules! traversal {
                             let lane = mask.trailing_zeros() as usize & 7;
                             mask &= mask - 1;
                             let (t, id) = (distances.0[lane], block.ids[lane]);
-                            if found.accepts(frame, t, id) {
+                            if found.accepts(ray, t, id) {
                                 found.t = t;
                                 found.id = id;
                                 found.weights = [second.0[lane], third.0[lane]];
@@ -195,11 +225,9 @@ macro_rules! traversal {
                 }
                 let limit = found.t * BOX_MARGIN;
                 loop {
-                    if waiting == 0 {
+                    let Some(entry) = stack.pop() else {
                         return found;
-                    }
-                    waiting -= 1;
-                    let entry = stack[waiting];
+                    };
                     if f32::from_bits((entry >> 32) as u32) <= limit {
                         child = entry as u32;
                         break;
@@ -211,20 +239,20 @@ macro_rules! traversal {
 }
 pub(super) use traversal;
 
-fn traverse<const ANY: bool>(tree: &WideBvh, kernel: Kernel, frame: &RayFrame) -> Found {
-    let found = Found::none(frame);
-    STACK.with_borrow_mut(|stack| match kernel {
-        Kernel::Portable => portable::<ANY>(tree, frame, found, stack),
+#[inline(always)]
+fn traverse<const ANY: bool>(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> Found {
+    match kernel {
+        Kernel::Portable => portable::<ANY>(tree, ray),
         #[cfg(target_arch = "x86_64")]
-        Kernel::Avx2 => super::avx2::traverse::<ANY>(tree, frame, found, stack),
-    })
+        Kernel::Avx2 => super::avx2::traverse::<ANY>(tree, ray),
+        #[cfg(target_arch = "x86_64")]
+        Kernel::Avx512 => super::avx2::traverse_avx512::<ANY>(tree, ray),
+    }
 }
 
+#[inline(always)]
 pub(super) fn closest(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> Hit {
-    let Some(frame) = RayFrame::new(ray) else {
-        return Hit::MISS;
-    };
-    let found = traverse::<false>(tree, kernel, &frame);
+    let found = traverse::<false>(tree, kernel, ray);
     if !found.any {
         return Hit::MISS;
     }
@@ -236,8 +264,9 @@ pub(super) fn closest(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> Hit {
     }
 }
 
+#[inline(always)]
 pub(super) fn any(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> bool {
-    RayFrame::new(ray).is_some_and(|frame| traverse::<true>(tree, kernel, &frame).any)
+    traverse::<true>(tree, kernel, ray).any
 }
 
 /// One triangle seen along the ray.
@@ -301,38 +330,35 @@ fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-traversal! { fn portable(itself, portable_boxes, portable_block, nothing) }
-
-fn itself(frame: &RayFrame) -> &RayFrame {
-    frame
-}
+traversal! { fn portable(RayFrame::new, portable_boxes, portable_block, nothing) }
 
 fn nothing(_: &WideBvh, _: u32) {}
 
 /// A plane through an origin that moves along it gives 0 * inf = NaN, which `min` and `max` pass over: no constraint.
 #[inline(always)]
-fn portable_boxes(node: &WideNode, frame: &&RayFrame, limit: f32) -> (u32, Eight) {
+fn portable_boxes(node: &WideNode, frame: &RayFrame, limit: f32) -> (u32, Eight) {
     let mut near = [frame.t_min; 8];
-    let mut far = [limit; 8];
+    let mut far = [limit * BOX_MARGIN; 8];
     for axis in 0..3 {
         let near_side = frame.near_side[axis] & 1;
         let near_row = &node.planes[axis][near_side];
         let far_row = &node.planes[axis][near_side ^ 1];
-        let (origin, inverse) = (frame.origin[axis], frame.inv_direction[axis]);
+        let origin = frame.origin[axis];
+        let (entry, exit) = (frame.inv_direction[axis], frame.exit_inv_direction[axis]);
         for lane in 0..8 {
-            near[lane] = max((near_row[lane] - origin) * inverse, near[lane]);
-            far[lane] = min((far_row[lane] - origin) * inverse, far[lane]);
+            near[lane] = max((near_row[lane] - origin) * entry, near[lane]);
+            far[lane] = min((far_row[lane] - origin) * exit, far[lane]);
         }
     }
     let mut mask = 0;
     for lane in 0..8 {
-        mask |= u32::from(near[lane] <= far[lane] * BOX_MARGIN) << lane;
+        mask |= u32::from(near[lane] <= far[lane]) << lane;
     }
     (mask, Eight(near))
 }
 
 #[inline(always)]
-fn portable_block(block: &TriangleBlock, frame: &&RayFrame, limit: f32) -> (u32, [Eight; 3]) {
+fn portable_block(block: &TriangleBlock, frame: &RayFrame, limit: f32) -> (u32, [Eight; 3]) {
     let mut mask = 0;
     let mut results = [Eight([0.0; 8]); 3];
     for lane in 0..8 {

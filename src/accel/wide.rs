@@ -4,6 +4,8 @@
 use glam::Vec3;
 use obvhs::bvh2::Bvh2;
 
+use super::large_pages::on_large_pages;
+
 /// High bit of a child word: the child is a leaf, the rest is first block << 3 | blocks - 1. Without it the word is a node index.
 pub(super) const LEAF: u32 = 1 << 31;
 
@@ -11,6 +13,7 @@ pub(super) const LEAF: u32 = 1 << 31;
 pub(super) const MAX_LEVELS: usize = 73;
 
 const WIDTH: usize = 8;
+
 /// Eight numbers where one instruction can load or store them.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(32))]
@@ -18,7 +21,7 @@ pub(super) struct Eight(pub(super) [f32; WIDTH]);
 
 const MAX_LEAF_TRIANGLES: u32 = 16;
 /// Cost of a triangle block relative to a node.
-const BLOCK_COST: f32 = 0.3;
+const BLOCK_COST: f32 = 0.4;
 
 /// Eight child boxes and what they hold. An empty slot has an inverted infinite box and points at the all-zero block.
 #[derive(Clone, Copy)]
@@ -109,7 +112,10 @@ impl WideBvh {
                 node.children[slot] = word;
             }
         }
-        Some(wide)
+        Some(WideBvh {
+            nodes: on_large_pages(&wide.nodes),
+            blocks: on_large_pages(&wide.blocks),
+        })
     }
 
     fn push_leaf(&mut self, tree: &Bvh2, triangles: &[[Vec3; 3]], first_id: u32, root: u32) -> u32 {
