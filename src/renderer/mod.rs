@@ -27,10 +27,10 @@ use std::time::Instant;
 use glam::DMat4;
 
 pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
-pub use stats::Stats;
+pub use stats::{Stats, StatsRays};
 
 use crate::cpu;
-use crate::film::{Film, Picture, Planes, composite, planes};
+use crate::film::{Film, MergeError, Picture, Planes, composite, planes};
 use crate::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError};
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Side};
@@ -249,6 +249,27 @@ impl Renderer {
         self.run_pass(Pass::Real { everywhere }, &Cancel::new(&|| false, None))
     }
 
+    /// A renderer that goes on from the film of an earlier one of the same scene and settings: it stands at the film's last sample, and traces
+    /// what edge pixels lack.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`]; or the film is of another size than the camera.
+    pub fn with_film(scene: Scene, film: Film) -> Result<Self, RenderError> {
+        let size = (scene.camera.width, scene.camera.height);
+        if (film.width, film.height) != size {
+            let sizes = MergeError::Size(film.width, film.height, size.0, size.1);
+            return Err(sizes.into());
+        }
+        let options = RendererOptions {
+            all_planes: !film.guides.is_empty(),
+            sample_range: Some((film.first_sample, scene.settings.rays_per_pixel)),
+        };
+        let mut renderer = Self::new(scene, options)?;
+        renderer.film = film;
+        renderer.replay_real()?;
+        Ok(renderer)
+    }
+
     /// Adds the film of another renderer of the same scene whose samples come just before or just after this one's, and traces what edge
     /// pixels then lack. The result equals one render of both ranges within 2 units in the last place.
     ///
@@ -259,6 +280,20 @@ impl Renderer {
         let end = self.film.first_sample + self.samples();
         self.end_sample = self.end_sample.max(end);
         self.replay_real()
+    }
+
+    /// Another number of rays per pixel and another seed. Nothing is rebuilt but the pilot; the film starts anew with all samples to render.
+    ///
+    /// # Errors
+    /// As [`Renderer::set_lens`].
+    pub fn set_samples(&mut self, rays_per_pixel: u32, seed: u32) -> Result<(), RenderError> {
+        self.scene.settings.rays_per_pixel = rays_per_pixel;
+        self.scene.settings.seed = seed;
+        self.packed.frame.rays_total = rays_per_pixel;
+        self.packed.frame.seed = seed;
+        self.film.first_sample = 0;
+        self.end_sample = rays_per_pixel;
+        self.restart(false)
     }
 
     /// Another lens. Nothing is rebuilt but the pilot; the film starts anew.
