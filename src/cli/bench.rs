@@ -135,7 +135,8 @@ impl Arguments {
                 .num_threads(usize::from(threads))
                 .build_global()?;
         }
-        let machine = Machine::this();
+        let cpu_only = self.backends.as_slice() == [BackendChoice::Cpu];
+        let machine = Machine::this(!cpu_only && self.report.is_none());
         let methods = self.methods(machine.gpu.as_ref().is_some_and(|gpu| gpu.hardware));
         std::fs::create_dir_all(&self.output)
             .map_err(|error| Failure(format!("{}: {error}", self.output.display())))?;
@@ -249,7 +250,7 @@ struct Gallery {
 /// Measures; true if it was interrupted.
 fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
     let arguments = &job.arguments;
-    let scenes = load_scenes(arguments)?;
+    let scenes = load_scenes(arguments, job.hardware_gpu())?;
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
     let plan = job.plan(arguments.rpp.clone());
@@ -312,8 +313,12 @@ impl Job {
             rays_per_pixel,
             repeats: self.arguments.repeats,
             first_seed: self.arguments.seed,
-            hardware_gpu: self.machine.gpu.as_ref().is_some_and(|gpu| gpu.hardware),
+            hardware_gpu: self.hardware_gpu(),
         }
+    }
+
+    fn hardware_gpu(&self) -> bool {
+        self.machine.gpu.as_ref().is_some_and(|gpu| gpu.hardware)
     }
 
     fn empty_report(&self) -> Report {
@@ -334,10 +339,16 @@ impl Job {
     }
 }
 
-fn load_scenes(arguments: &Arguments) -> Result<Vec<Scene>, Failure> {
+/// `hardware_gpu`: references are made on it.
+fn load_scenes(arguments: &Arguments, hardware_gpu: bool) -> Result<Vec<Scene>, Failure> {
     let mut scenes: Vec<Scene> = Vec::new();
     for path in &arguments.scenes {
-        let scene = shrink(scene::load(path)?, arguments.shrink);
+        let mut scene = shrink(scene::load(path)?, arguments.shrink);
+        scene.settings.backend = if hardware_gpu {
+            BackendChoice::Gpu
+        } else {
+            BackendChoice::Cpu
+        };
         for warning in &scene.warnings {
             say("warning", warning);
         }

@@ -23,9 +23,14 @@ pub struct Gpu {
 }
 
 impl Machine {
-    /// This one, with its best graphics adapter.
-    pub fn this() -> Self {
-        let gpu = list_adapters().into_iter().next().map(|adapter| Gpu {
+    /// This one; its best graphics adapter is looked for only where it is wanted.
+    pub fn this(with_gpu: bool) -> Self {
+        let adapters = if with_gpu {
+            list_adapters()
+        } else {
+            Vec::new()
+        };
+        let gpu = adapters.into_iter().next().map(|adapter| Gpu {
             name: format!("{} ({})", adapter.name, adapter.backend),
             driver: adapter.driver,
             hardware: adapter.hardware,

@@ -6,7 +6,7 @@ use super::{ReferenceNote, Truth};
 use crate::film::Picture;
 use crate::output::{ChannelFile, OutputError, Target, write_reference};
 use crate::renderer::{Budget, RenderError, Renderer, RendererOptions};
-use crate::scene::{BackendChoice, Choice, Composite, Estimator, Photo, SamplerKind, Scene};
+use crate::scene::{Choice, Composite, Estimator, Photo, SamplerKind, Scene};
 
 /// Independent scrambles from which the standard error is taken, at least.
 const SCRAMBLES: u32 = 16;
@@ -60,7 +60,7 @@ pub struct Reference {
     pub note: ReferenceNote,
 }
 
-/// Reads or makes the reference of a scene; `tick` hears how far it is. `None` once `cancelled` says so.
+/// Reads or makes the reference of a scene, on the backend that its settings name; `tick` hears how far it is. `None` once `cancelled` says so.
 ///
 /// # Errors
 /// It cannot be read, made or kept, or a given one has another size.
@@ -73,7 +73,6 @@ pub fn reference(
     tick: &mut dyn FnMut(&str),
 ) -> Result<Option<Reference>, ReferenceError> {
     let mut scene = scene.clone();
-    scene.settings.backend = BackendChoice::Auto;
     scene.settings.estimator = Estimator::Direct;
     scene.settings.sampler = SamplerKind::Sobol;
     scene.settings.composite = composite;
@@ -393,7 +392,9 @@ mod tests {
 
     fn scene() -> Scene {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/far/scene.toml");
-        super::super::shrink(crate::scene::load(&path).unwrap(), 10)
+        let mut scene = super::super::shrink(crate::scene::load(&path).unwrap(), 10);
+        scene.settings.backend = crate::scene::BackendChoice::Cpu;
+        scene
     }
 
     #[test]
