@@ -8,6 +8,7 @@ use clap::Args;
 use super::render::choice;
 use super::{Failure, Outcome, interrupt, print, progress, say};
 use crate::output::{write_bytes, write_text};
+use crate::renderer::Skip;
 use crate::report::{
     Axis, FORMAT, Machine, Method, PAPER_SCENE, PaperRow, Plan, Plot, Reach, ReferenceGoal, Report,
     Row, Shot, Source, Target, Truth, Verdict, against, cost_to_reach, csv, log_log_slope,
@@ -65,6 +66,9 @@ pub(super) struct Arguments {
     /// Divide the scenes' width and height
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
     shrink: u32,
+    /// Measure `direct` without each of its savings too
+    #[arg(long)]
+    ablate: bool,
     /// Find the time that each method needs for this RMSE
     #[arg(long, value_name = "X", value_parser = above_zero)]
     target_rmse: Option<f64>,
@@ -78,9 +82,9 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["scenes", "paper_table"])]
     report: Option<PathBuf>,
     /// The frame rates of Kan and Kaufmann 2012, Table 1, and ours on a scene like theirs
-    #[arg(long, conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against"])]
+    #[arg(long, conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate"])]
     paper_table: bool,
-    /// Write the table into this page, between <!-- bench --> (or <!-- paper-table -->) and <!-- end -->
+    /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->) and <!-- end -->
     #[arg(long, value_name = "FILE")]
     write_docs: Option<PathBuf>,
     /// CPU threads [default: all]
@@ -119,10 +123,10 @@ impl Arguments {
             let message = "--reference is of one scene, and so must be the scenes";
             return Err(Failure(message.to_owned()));
         }
-        let section = if self.paper_table {
-            "paper-table"
-        } else {
-            "bench"
+        let section = match (self.paper_table, self.ablate) {
+            (true, _) => "paper-table",
+            (false, true) => "ablate",
+            (false, false) => "bench",
         };
         let docs = self
             .write_docs
@@ -149,6 +153,7 @@ impl Arguments {
         })
     }
 
+    /// What to measure.
     fn methods(&self, hardware_gpu: bool) -> Vec<Method> {
         let backends = match self.backends.as_slice() {
             [] if hardware_gpu => vec![BackendChoice::Cpu, BackendChoice::Gpu],
@@ -181,9 +186,14 @@ impl Arguments {
                             estimator,
                             sampler,
                             composite,
+                            without: None,
                         };
-                        if !methods.contains(&method) {
-                            methods.push(method);
+                        if methods.contains(&method) {
+                            continue;
+                        }
+                        methods.push(method);
+                        if self.ablate && estimator == Estimator::Direct {
+                            methods.extend(without_each(method));
                         }
                     }
                 }
@@ -191,6 +201,17 @@ impl Arguments {
         }
         methods
     }
+}
+
+/// The method once for each saving that it has, with that one switched off.
+fn without_each(method: Method) -> impl Iterator<Item = Method> {
+    let savings = Skip::CHOICES.iter().map(|(_, skip)| *skip);
+    savings
+        .filter(move |skip| *skip != Skip::Specialisation || method.backend == BackendChoice::Gpu)
+        .map(move |skip| Method {
+            without: Some(skip),
+            ..method
+        })
 }
 
 impl Docs {

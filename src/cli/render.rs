@@ -11,7 +11,7 @@ use crate::output::{
     FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr, write_film, write_png,
     write_text,
 };
-use crate::renderer::{Budget, Renderer, RendererOptions, Stats};
+use crate::renderer::{Budget, Renderer, RendererOptions, Skip, Stats, Without};
 use crate::scene::{
     self, BackendChoice, Choice, Composite, Estimator, Overrides, SamplerKind, Settings,
 };
@@ -55,6 +55,9 @@ pub(super) struct Arguments {
     /// Render only these of each pixel's rays, FROM to TO - 1, into an .exr that `mixray merge` puts together with the others
     #[arg(long, value_name = "FROM..TO", value_parser = sample_range)]
     range: Option<(u32, u32)>,
+    /// Do without a saving, to see what it is worth; may be given several times
+    #[arg(long, value_name = "NAME", value_parser = choice::<Skip>())]
+    no_skip: Vec<Skip>,
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
@@ -83,6 +86,7 @@ pub(super) struct Job {
     stats: Option<PathBuf>,
     threads: Option<u16>,
     range: Option<(u32, u32)>,
+    without: Without,
 }
 
 impl Arguments {
@@ -116,6 +120,7 @@ impl Arguments {
             stats: self.stats,
             threads: self.threads,
             range: self.range,
+            without: self.no_skip.into_iter().collect(),
         })
     }
 }
@@ -144,6 +149,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let options = RendererOptions {
         all_planes: targets.iter().any(|t| t.format() == Format::Exr),
         sample_range: job.range,
+        without: job.without,
     };
     let mut renderer = Renderer::new(scene, options)?;
     let interrupted = interrupt::watch()?;

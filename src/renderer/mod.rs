@@ -19,6 +19,7 @@
 
 mod control;
 mod photo_albedo;
+mod skips;
 mod stats;
 
 use std::sync::Arc;
@@ -27,6 +28,7 @@ use std::time::Instant;
 use glam::DMat4;
 
 pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
+pub use skips::{Skip, Without};
 pub use stats::{Stats, StatsRays};
 
 use crate::cpu;
@@ -46,6 +48,8 @@ pub struct RendererOptions {
     /// The first and the end of the samples to render of each pixel's `rays_per_pixel`; `None`: all. Films of ranges that follow one
     /// another are put together by [`Renderer::merge`].
     pub sample_range: Option<(u32, u32)>,
+    /// Savings to do without.
+    pub without: Without,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -122,12 +126,17 @@ impl Renderer {
             notes: Vec::new(),
         };
         renderer.prepare_photo();
-        renderer.packed.pixels = cpu::pilot(&renderer.packed);
+        renderer.look_at_pixels();
         renderer.seconds.build = start.elapsed().as_secs_f64();
         let start = Instant::now();
         renderer.backend = renderer.open_backend()?;
         renderer.seconds.compile = start.elapsed().as_secs_f64();
         Ok(renderer)
+    }
+
+    fn look_at_pixels(&mut self) {
+        self.packed.pixels = cpu::pilot(&self.packed);
+        self.options.without.apply(&mut self.packed.pixels);
     }
 
     fn open_backend(&mut self) -> Result<Backend, RenderError> {
@@ -136,8 +145,9 @@ impl Renderer {
             BackendChoice::Gpu => AdapterChoice::Any,
             BackendChoice::Auto => AdapterChoice::Hardware,
         };
-        let opened =
-            GpuDevice::open(choice).and_then(|gpu| GpuBackend::new(Arc::new(gpu), &self.packed));
+        let specialised = !self.options.without.contains(Skip::Specialisation);
+        let opened = GpuDevice::open(choice)
+            .and_then(|gpu| GpuBackend::new(Arc::new(gpu), &self.packed, specialised));
         match opened {
             Ok(gpu) => Ok(Backend::Gpu(Box::new(gpu))),
             Err(error) if self.scene.settings.backend == BackendChoice::Auto => {
@@ -244,8 +254,9 @@ impl Renderer {
 
     /// Short beside the main passes, and without it edge pixels would not be Eq. 4: not cancelled.
     fn replay_real(&mut self) -> Result<(), RenderError> {
-        let everywhere =
-            self.options.all_planes || self.scene.settings.composite == Composite::Quotient;
+        let everywhere = self.options.all_planes
+            || self.scene.settings.composite == Composite::Quotient
+            || self.options.without.contains(Skip::EdgeReal);
         self.run_pass(Pass::Real { everywhere }, &Cancel::new(&|| false, None))
     }
 
@@ -263,6 +274,7 @@ impl Renderer {
         let options = RendererOptions {
             all_planes: !film.guides.is_empty(),
             sample_range: Some((film.first_sample, scene.settings.rays_per_pixel)),
+            without: Without::default(),
         };
         let mut renderer = Self::new(scene, options)?;
         renderer.film = film;
@@ -371,7 +383,7 @@ impl Renderer {
         if real_light_changed {
             self.prepare_photo();
         }
-        self.packed.pixels = cpu::pilot(&self.packed);
+        self.look_at_pixels();
         self.film = Film::new(
             self.film.width,
             self.film.height,

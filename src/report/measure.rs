@@ -149,7 +149,11 @@ impl Subject {
         settings.estimator = method.estimator;
         settings.sampler = method.sampler;
         settings.composite = method.composite;
-        let renderer = Renderer::new(scene, RendererOptions::default())?;
+        let options = RendererOptions {
+            without: method.without.into_iter().collect(),
+            ..RendererOptions::default()
+        };
+        let renderer = Renderer::new(scene, options)?;
         let seconds = renderer.seconds();
         Ok(Self {
             method,

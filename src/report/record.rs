@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::{Errors, Machine, Reach};
-use crate::renderer::StatsRays;
+use crate::renderer::{Skip, StatsRays};
 use crate::scene::{BackendChoice, Composite, Estimator, SamplerKind};
 
 /// Version of the JSON; a file of another version is not compared.
@@ -57,10 +57,17 @@ pub struct Method {
     pub sampler: SamplerKind,
     #[serde(with = "by_name")]
     pub composite: Composite,
+    /// A saving that is switched off.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        with = "by_name_if_any"
+    )]
+    pub without: Option<Skip>,
 }
 
 impl Method {
-    /// "cpu direct sobol"; a quotient composite is named, the additive one is not.
+    /// "cpu direct sobol"; a quotient composite and a saving that is off are named.
     pub fn label(&self) -> String {
         use crate::scene::Choice;
         let mut label = format!(
@@ -72,6 +79,10 @@ impl Method {
         if self.composite != Composite::Additive {
             label += " ";
             label += self.composite.name();
+        }
+        if let Some(skip) = self.without {
+            label += " without ";
+            label += skip.name();
         }
         label
     }
@@ -159,6 +170,33 @@ pub struct Target {
     pub rays_per_pixel: Reach,
 }
 
+/// Likewise, where there may be none.
+mod by_name_if_any {
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    use crate::scene::Choice;
+
+    pub fn serialize<T: Choice, S: Serializer>(
+        choice: &Option<T>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        match choice {
+            Some(choice) => serializer.serialize_str(choice.name()),
+            None => serializer.serialize_none(),
+        }
+    }
+
+    pub fn deserialize<'de, T: Choice, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<T>, D::Error> {
+        let name: Option<String> = Option::deserialize(deserializer)?;
+        name.map(|name| {
+            T::from_name(&name).ok_or_else(|| D::Error::custom(format!("unknown choice {name:?}")))
+        })
+        .transpose()
+    }
+}
+
 /// Choices as their names.
 mod by_name {
     use serde::{Deserialize, Deserializer, Serializer, de::Error};
@@ -192,6 +230,7 @@ pub(super) mod test_support {
             estimator,
             sampler,
             composite: Composite::Additive,
+            without: None,
         };
         let row = |method, secs: f64, mse: f64| Row {
             scene: "a <b>, \"c\"".into(),
@@ -264,11 +303,14 @@ pub(super) mod test_support {
 
     #[test]
     fn json_reads_back_and_names_what_it_holds() {
-        let report = report();
+        let mut report = report();
+        report.rows[0].method.without = Some(Skip::OutOfReach);
         let json = serde_json::to_string(&report).unwrap();
         assert_eq!(serde_json::from_str::<Report>(&json).unwrap(), report);
         let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(value["rows"][0]["without"], "out-of-reach");
         let row = value["rows"][1].as_object().unwrap();
+        assert!(!row.contains_key("without"));
         for (key, expected) in [
             ("backend", "cpu"),
             ("estimator", "paper"),
