@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use mixray::output::ChannelFile;
+use mixray::renderer::{Budget, Renderer, RendererOptions, Skip};
 
 /// A ball over a textured floor, out of focus: background, edge and virtual pixels.
 const SCENE: &str = "\
@@ -262,6 +263,91 @@ fn the_papers_table_has_a_row_a_count_of_rays() {
         assert!((fps * row["wall_secs"].as_f64().unwrap() - 1.0).abs() < 1e-9);
         assert!(row["rays_traced"].as_u64().unwrap() > 0);
     }
+}
+
+/// Pictures of a few seeds without some savings, and the rays that they took together.
+fn pictures(folder: &Folder, without: &[Skip]) -> (Vec<Vec<f32>>, u64) {
+    let scene = mixray::scene::load(&folder.path("scene.toml")).unwrap();
+    let options = RendererOptions {
+        without: without.iter().copied().collect(),
+        ..RendererOptions::default()
+    };
+    let mut renderer = Renderer::new(scene, options).unwrap();
+    let pictures = (0..64)
+        .map(|seed| {
+            renderer.set_samples(8, seed).unwrap();
+            renderer
+                .advance(Budget::Complete, &|| false, &mut |_| ())
+                .unwrap();
+            renderer.picture().linear.into_flattened()
+        })
+        .collect();
+    (pictures, renderer.rays().traced())
+}
+
+/// Those that are proven not to change the result do not; the others have the same expectation.
+#[test]
+fn savings_change_the_result_no_more_than_they_say() {
+    let folder = Folder::new();
+    let (with, rays_with) = pictures(&folder, &[]);
+    for skip in [Skip::OutOfReach, Skip::EdgeReal] {
+        let (without, rays_without) = pictures(&folder, &[skip]);
+        assert!(with == without, "{skip:?}");
+        assert!(rays_without >= rays_with);
+    }
+    for skip in [Skip::Turns, Skip::Beams] {
+        let (without, rays_without) = pictures(&folder, &[skip]);
+        assert!(rays_without > rays_with, "{skip:?} saves rays");
+        let z = largest_z(&with, &without);
+        assert!(z < 4.0, "{skip:?}: {z}");
+        let darker: Vec<Vec<f32>> = (without.iter())
+            .map(|picture| picture.iter().map(|x| x * 0.98).collect())
+            .collect();
+        assert!(largest_z(&with, &darker) > 4.0, "control: 2% is noticed");
+    }
+}
+
+/// Of the picture's mean and of its four bands' means: the difference over its standard error.
+fn largest_z(a: &[Vec<f32>], b: &[Vec<f32>]) -> f64 {
+    let values = a[0].len();
+    let bands = (0..4).map(|i| i * values / 4..(i + 1) * values / 4);
+    bands
+        .chain(std::iter::once(0..values))
+        .map(|band| {
+            let moments = |pictures: &[Vec<f32>]| {
+                let means: Vec<f64> = pictures
+                    .iter()
+                    .map(|p| p[band.clone()].iter().map(|&x| f64::from(x)).sum::<f64>())
+                    .collect();
+                let count = means.len() as f64;
+                let mean = means.iter().sum::<f64>() / count;
+                let squares: f64 = means.iter().map(|m| (m - mean).powi(2)).sum();
+                (mean, squares / (count * (count - 1.0)))
+            };
+            let ((mean_a, variance_a), (mean_b, variance_b)) = (moments(a), moments(b));
+            let error = (variance_a + variance_b).sqrt();
+            // A band that only shows the photograph has no error at all.
+            (mean_a - mean_b).abs() / error.max(1e-9 * mean_a.abs())
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn each_saving_has_its_rows() {
+    let folder = Folder::new();
+    folder.succeed(&format!("{QUICK} --ablate"));
+    let report = folder.json("out/results.json");
+    let rows = report["rows"].as_array().unwrap();
+    // paper, direct, and direct without four savings, at two counts of rays.
+    assert_eq!(rows.len(), 2 * (2 + 4));
+    let rays = |without: serde_json::Value| -> u64 {
+        let row = rows.iter().find(|row| {
+            row["estimator"] == "direct" && row["rays_per_pixel"] == 4 && row["without"] == without
+        });
+        let rays = row.unwrap()["rays"].as_object().unwrap();
+        rays.values().map(|count| count.as_u64().unwrap()).sum()
+    };
+    assert!(rays("edge-real".into()) > rays(serde_json::Value::Null));
 }
 
 /// Renders ranges of `total` rays into part-0.exr and so on.
