@@ -250,6 +250,58 @@ fn a_regression_exits_with_1() {
     );
 }
 
+/// What was measured before Ctrl-C is written.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_benchmark_keeps_what_is_finished() {
+    use std::time::{Duration, Instant};
+
+    let folder = Folder::new();
+    // The first run leaves the reference, so that the second measures at once.
+    folder.succeed(QUICK);
+    std::fs::remove_file(folder.path("out/results.json")).unwrap();
+    let endless =
+        "bench scene.toml --backends cpu --rpp 1,4 --repeats 1000 --reference-error 0.5 -o out";
+    for wait_ms in [1_000, 4_000, 16_000] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_mixray"))
+            .current_dir(folder.0.path())
+            .args(endless.split_whitespace())
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(wait_ms));
+        let kill = Command::new("kill")
+            .args(["-INT", &child.id().to_string()])
+            .status();
+        assert!(kill.unwrap().success());
+        let start = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait().unwrap() {
+                break status;
+            }
+            if start.elapsed() > Duration::from_secs(30) {
+                child.kill().unwrap();
+                panic!("did not end");
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        if !folder.path("out/results.json").exists() {
+            // A busy machine: nothing was measured yet.
+            continue;
+        }
+        assert_eq!(status.code(), Some(130));
+        let report = folder.json("out/results.json");
+        let rows = report["rows"].as_array().unwrap();
+        assert!(!rows.is_empty());
+        for row in rows {
+            let runs = row["runs"].as_array().unwrap().len();
+            assert!((1..1000).contains(&runs), "{runs}");
+        }
+        return;
+    }
+    panic!("the benchmark never began");
+}
+
 #[test]
 fn the_papers_table_has_a_row_a_count_of_rays() {
     let folder = Folder::new();

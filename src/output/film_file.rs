@@ -403,7 +403,8 @@ mod tests {
     #[test]
     fn every_difference_is_a_mismatch() {
         assert_eq!(note().mismatch(&note()), None);
-        let changes: [(&str, fn(&mut FilmNote)); 8] = [
+        type Change = fn(&mut FilmNote);
+        let changes: [(&str, Change); 8] = [
             ("version", |n| n.version.push('1')),
             ("rays per pixel", |n| n.total = 99),
             ("seed", |n| n.seed = 0),
