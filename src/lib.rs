@@ -31,4 +31,5 @@ pub mod math;
 pub mod output;
 pub mod packed;
 pub mod renderer;
+pub mod report;
 pub mod scene;

@@ -3,9 +3,11 @@
 //! Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 a check failed, 2 usage or input, 130 ended by
 //! Ctrl-C with the picture written.
 
+mod bench;
 mod compare;
 mod info;
 mod interrupt;
+mod merge;
 mod progress;
 mod render;
 mod summary;
@@ -26,6 +28,8 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(render::Arguments),
+    Merge(merge::Arguments),
+    Bench(bench::Arguments),
     Compare(compare::Arguments),
     Info(info::Arguments),
 }
@@ -52,6 +56,8 @@ impl<E: std::error::Error> From<E> for Failure {
 pub fn run() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
+        Command::Merge(arguments) => merge::run(&arguments),
+        Command::Bench(arguments) => arguments.check().and_then(bench::run),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
     };

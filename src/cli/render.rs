@@ -8,9 +8,10 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::{Failure, Outcome, interrupt, print, progress, say, summary};
 use crate::output::{
-    Format, Metadata, PngBits, Target, check_writable, write_exr, write_png, write_text,
+    FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr, write_film, write_png,
+    write_text,
 };
-use crate::renderer::{Budget, Renderer, RendererOptions, Stats};
+use crate::renderer::{Budget, Renderer, RendererOptions, Skip, Stats, Without};
 use crate::scene::{
     self, BackendChoice, Choice, Composite, Estimator, Overrides, SamplerKind, Settings,
 };
@@ -51,17 +52,23 @@ pub(super) struct Arguments {
     /// Write times and counts as JSON
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
+    /// Render only these of each pixel's rays, FROM to TO - 1, into an .exr that `mixray merge` puts together with the others
+    #[arg(long, value_name = "FROM..TO", value_parser = sample_range)]
+    range: Option<(u32, u32)>,
+    /// Do without a saving, to see what it is worth; may be given several times
+    #[arg(long, value_name = "NAME", value_parser = choice::<Skip>())]
+    no_skip: Vec<Skip>,
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 }
 
-fn choice<T: Choice + Send + Sync>() -> impl TypedValueParser<Value = T> {
+pub(super) fn choice<T: Choice + Send + Sync>() -> impl TypedValueParser<Value = T> {
     let names = T::CHOICES.iter().map(|&(name, _)| name);
     PossibleValuesParser::new(names).try_map(|name| T::from_name(&name).ok_or("is not a choice"))
 }
 
-fn png_bits(name: String) -> PngBits {
+pub(super) fn png_bits(name: String) -> PngBits {
     match name.as_str() {
         "16" => PngBits::Sixteen,
         _ => PngBits::Eight,
@@ -78,17 +85,24 @@ pub(super) struct Job {
     png_bits: Option<PngBits>,
     stats: Option<PathBuf>,
     threads: Option<u16>,
+    range: Option<(u32, u32)>,
+    without: Without,
 }
 
 impl Arguments {
     pub(super) fn check(self) -> Result<Job, Failure> {
-        let targets = self
+        let targets: Vec<Target> = self
             .output
             .iter()
             .map(|path| Target::picture(path))
             .collect::<Result<_, _>>()?;
         if let Some(path) = &self.stats {
             check_writable(path)?;
+        }
+        if self.range.is_some() && !targets.iter().any(|t| t.format() == Format::Exr) {
+            let message =
+                "--range wants an .exr to write (-o part.exr): other pictures do not keep the film";
+            return Err(Failure(message.to_owned()));
         }
         Ok(Job {
             scene: self.scene,
@@ -105,6 +119,8 @@ impl Arguments {
             png_bits: self.png_bits,
             stats: self.stats,
             threads: self.threads,
+            range: self.range,
+            without: self.no_skip.into_iter().collect(),
         })
     }
 }
@@ -132,11 +148,13 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
 
     let options = RendererOptions {
         all_planes: targets.iter().any(|t| t.format() == Format::Exr),
-        ..RendererOptions::default()
+        sample_range: job.range,
+        without: job.without,
     };
     let mut renderer = Renderer::new(scene, options)?;
     let interrupted = interrupt::watch()?;
-    let bar = progress::Bar::new(renderer.scene().settings.rays_per_pixel);
+    let (first, end) = (job.range).unwrap_or((0, renderer.scene().settings.rays_per_pixel));
+    let bar = progress::Bar::new(end - first);
     let result = renderer.advance(Budget::Complete, &|| interrupted.is_set(), &mut |p| {
         bar.show(&p);
     });
@@ -148,13 +166,16 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     warn_of_non_finite(&renderer);
 
     let start = Instant::now();
-    write(&renderer, &targets, job.png_bits)?;
+    write(&renderer, &targets, job.png_bits, job.range.is_some())?;
     let write_secs = start.elapsed().as_secs_f64();
     let stats = Stats::new(&renderer, load_secs, write_secs);
     if let Some(path) = &job.stats {
         write_text(path, &stats.to_json())?;
     }
     print(&summary::text(&renderer, &stats, &targets));
+    if job.range.is_some() && interrupted.is_set() {
+        say("warning", "the range is not complete: it cannot be merged");
+    }
     Ok(if interrupted.is_set() {
         Outcome::Interrupted
     } else {
@@ -162,10 +183,12 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     })
 }
 
-fn write(
+/// `with_film`: EXR files keep the film's sums.
+pub(super) fn write(
     renderer: &Renderer,
     targets: &[Target],
     png_bits: Option<PngBits>,
+    with_film: bool,
 ) -> Result<(), Failure> {
     let picture = renderer.picture();
     let photo = renderer.scene().photo.as_ref();
@@ -177,11 +200,30 @@ fn write(
             }
             Format::Exr => {
                 let metadata = Metadata::new(renderer.scene(), renderer.samples());
-                write_exr(target, &picture, &renderer.planes(), &metadata)?;
+                let planes = renderer.planes();
+                if with_film {
+                    let film = renderer.film();
+                    let first = film.first_sample;
+                    let range = (first, first + renderer.samples());
+                    let note = FilmNote::new(renderer.scene(), range);
+                    write_film(target, &picture, &planes, &metadata, film, &note)?;
+                } else {
+                    write_exr(target, &picture, &planes, &metadata)?;
+                }
             }
         }
     }
     Ok(())
+}
+
+/// "16..32".
+fn sample_range(text: &str) -> Result<(u32, u32), &'static str> {
+    let ends = text.split_once("..");
+    let parsed = ends.and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?)));
+    match parsed {
+        Some((from, to)) if from < to => Ok((from, to)),
+        _ => Err("expected FROM..TO, two whole numbers, the first below the second"),
+    }
 }
 
 /// Says which sample to render again to see the first of them.

@@ -14,10 +14,22 @@ pub fn flip(width: usize, height: usize, reference: &[[f32; 3]], test: &[[f32; 3
     if reference.is_empty() {
         return 0.0;
     }
+    // Summed in one order, so that the number of threads does not change the result.
+    let sum: f64 = flip_map(width, height, reference, test).iter().sum();
+    sum / (width * height) as f64
+}
+
+/// FLIP error of every pixel.
+pub fn flip_map(
+    width: usize,
+    height: usize,
+    reference: &[[f32; 3]],
+    test: &[[f32; 3]],
+) -> Vec<f64> {
     let colour = Colour::new();
     let reference = Perceived::new(&colour, width, height, reference);
     let test = Perceived::new(&colour, width, height, test);
-    let sum: f64 = (0..width * height)
+    (0..width * height)
         .into_par_iter()
         .map(|i| {
             let colour_difference = colour.difference(reference.lab[i], test.lab[i]);
@@ -27,11 +39,7 @@ pub fn flip(width: usize, height: usize, reference: &[[f32; 3]], test: &[[f32; 3
             let feature_difference = (edges.max(points) / 2.0f64.sqrt()).min(1.0).sqrt();
             colour_difference.powf(1.0 - feature_difference)
         })
-        // Collected before summing so that the number of threads does not change the result.
-        .collect::<Vec<f64>>()
-        .iter()
-        .sum();
-    sum / (width * height) as f64
+        .collect()
 }
 
 /// What the eye makes of one image.

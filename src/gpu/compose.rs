@@ -101,6 +101,18 @@ features! {
 }
 
 impl Features {
+    /// What `scene` needs if kernels are `specialised`, else everything that does not exclude its estimator.
+    pub fn wanted(scene: &PackedScene, specialised: bool) -> Self {
+        let needed = Self::for_scene(scene);
+        if specialised {
+            return needed;
+        }
+        Self {
+            paper: needed.paper,
+            ..Self::all()
+        }
+    }
+
     /// What `scene` needs, never less.
     pub fn for_scene(scene: &PackedScene) -> Self {
         let material = |test: &dyn Fn(&packed::Material) -> bool| scene.materials.iter().any(test);

@@ -64,6 +64,8 @@ pub struct GpuBackend {
     warm: bool,
     profiler: Option<Profiler>,
     batches_until_loss: Option<u32>,
+    /// The kernels hold no more than the scene needs.
+    specialised: bool,
 }
 
 /// One dispatch of a submission.
@@ -75,14 +77,22 @@ struct Dispatch {
 }
 
 impl GpuBackend {
-    /// Uploads the scene and compiles kernels that do what it needs and no more.
+    /// Uploads the scene and compiles kernels that do what it needs, and no more if they are `specialised`.
     ///
     /// # Errors
     /// [`GpuError::Limit`] if the scene does not fit the device.
-    pub fn new(gpu: Arc<GpuDevice>, scene: &PackedScene) -> Result<Self, GpuError> {
+    pub fn new(
+        gpu: Arc<GpuDevice>,
+        scene: &PackedScene,
+        specialised: bool,
+    ) -> Result<Self, GpuError> {
         let buffers = SceneBuffers::from_parts(&gpu, &SceneParts::from(scene))?;
-        let features = Features::for_scene(scene);
-        Self::with_modules(gpu, &Composer::default(), &features, buffers)
+        let features = Features::wanted(scene, specialised);
+        let backend = Self::with_modules(gpu, &Composer::default(), &features, buffers)?;
+        Ok(Self {
+            specialised,
+            ..backend
+        })
     }
 
     /// Takes the scene as it is now; compiles again only if it needs other features than before.
@@ -90,9 +100,9 @@ impl GpuBackend {
     /// # Errors
     /// As [`GpuBackend::new`].
     pub fn set_scene(&mut self, scene: &PackedScene) -> Result<(), GpuError> {
-        let features = Features::for_scene(scene);
+        let features = Features::wanted(scene, self.specialised);
         if features != self.features {
-            *self = Self::new(Arc::clone(&self.gpu), scene)?;
+            *self = Self::new(Arc::clone(&self.gpu), scene, self.specialised)?;
             return Ok(());
         }
         self.scene = SceneBuffers::from_parts(&self.gpu, &SceneParts::from(scene))?;
@@ -136,6 +146,7 @@ impl GpuBackend {
             warm: false,
             profiler: None,
             batches_until_loss: None,
+            specialised: true,
         })
     }
 

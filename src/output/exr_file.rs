@@ -38,7 +38,7 @@ impl Metadata {
     }
 
     fn attributes(&self) -> HashMap<Text, AttributeValue> {
-        let text = |s: &str| AttributeValue::Text(Text::from(s));
+        let text = text_value;
         let number = |x: u32| AttributeValue::F64(f64::from(x));
         let estimator = match self.estimator {
             Estimator::Direct => "direct",
@@ -86,6 +86,46 @@ fn rec709() -> Chromaticities {
     }
 }
 
+/// Channels of a file in the making.
+pub(super) type Channels = SmallVec<[AnyChannel<FlatSamples>; 4]>;
+
+/// Samples that are empty stand for a plane that was not asked for: it is left out.
+pub(super) fn push_channel<T: IntoSamples>(channels: &mut Channels, name: &str, samples: Vec<T>) {
+    if !samples.is_empty() {
+        channels.push(AnyChannel::new(Text::from(name), T::into_samples(samples)));
+    }
+}
+
+/// What a channel can hold.
+pub(super) trait IntoSamples: Sized {
+    fn into_samples(samples: Vec<Self>) -> FlatSamples;
+}
+
+impl IntoSamples for f32 {
+    fn into_samples(samples: Vec<Self>) -> FlatSamples {
+        FlatSamples::F32(samples)
+    }
+}
+
+impl IntoSamples for u32 {
+    fn into_samples(samples: Vec<Self>) -> FlatSamples {
+        FlatSamples::U32(samples)
+    }
+}
+
+/// Three channels of a layer, whose name ends with a dot.
+pub(super) fn push_three(
+    channels: &mut Channels,
+    layer: &str,
+    names: [&str; 3],
+    values: &[[f32; 3]],
+) {
+    for (c, name) in names.into_iter().enumerate() {
+        let samples: Vec<f32> = values.iter().map(|v| v[c]).collect();
+        push_channel(channels, &format!("{layer}{name}"), samples);
+    }
+}
+
 /// Writes the composite as R, G, B and every plane as its own layer; planes that were not asked for (empty) are left out.
 ///
 /// # Errors
@@ -96,43 +136,66 @@ pub fn write_exr(
     planes: &Planes,
     metadata: &Metadata,
 ) -> Result<(), OutputError> {
-    let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
-    let mut push = |name: String, samples: Vec<f32>| {
-        if !samples.is_empty() {
-            let name = Text::from(name.as_str());
-            channels.push(AnyChannel::new(name, FlatSamples::F32(samples)));
-        }
-    };
-    let three = [
-        ("", ["R", "G", "B"], &picture.linear),
-        ("mixed.", ["R", "G", "B"], &planes.mixed),
-        ("real.", ["R", "G", "B"], &planes.real),
-        ("difference.", ["R", "G", "B"], &planes.difference),
-        ("albedo.", ["R", "G", "B"], &planes.albedo),
-        ("variance.", ["R", "G", "B"], &planes.variance),
-        ("normal.", ["X", "Y", "Z"], &planes.normal),
-    ];
-    for (layer, names, values) in three {
-        for (c, name) in names.into_iter().enumerate() {
-            push(
-                format!("{layer}{name}"),
-                values.iter().map(|v| v[c]).collect(),
-            );
-        }
-    }
-    push("mask.Y".into(), planes.mask.clone());
-    push("depth.Z".into(), planes.depth.clone());
-    push("samples.Y".into(), planes.samples.clone());
+    let nothing_more = std::iter::empty();
+    write_layers(
+        target,
+        picture,
+        planes,
+        metadata,
+        Channels::new(),
+        nothing_more,
+    )
+}
 
-    let mut attributes = LayerAttributes {
+/// As [`write_exr`], with more channels and text attributes.
+pub(super) fn write_layers<'a>(
+    target: &Target,
+    picture: &Picture,
+    planes: &Planes,
+    metadata: &Metadata,
+    mut channels: Channels,
+    texts: impl Iterator<Item = (&'a str, &'a str)>,
+) -> Result<(), OutputError> {
+    for (layer, values) in [
+        ("", &picture.linear),
+        ("mixed.", &planes.mixed),
+        ("real.", &planes.real),
+        ("difference.", &planes.difference),
+        ("albedo.", &planes.albedo),
+        ("variance.", &planes.variance),
+    ] {
+        push_three(&mut channels, layer, ["R", "G", "B"], values);
+    }
+    push_three(&mut channels, "normal.", ["X", "Y", "Z"], &planes.normal);
+    push_channel(&mut channels, "mask.Y", planes.mask.clone());
+    push_channel(&mut channels, "depth.Z", planes.depth.clone());
+    push_channel(&mut channels, "samples.Y", planes.samples.clone());
+
+    let mut attributes = metadata.attributes();
+    attributes.extend(texts.map(|(name, text)| (Text::from(name), text_value(text))));
+    write_channels(target, picture.width, picture.height, channels, attributes)
+}
+
+pub(super) fn text_value(text: &str) -> AttributeValue {
+    AttributeValue::Text(Text::from(text))
+}
+
+/// Writes a file of one part.
+pub(super) fn write_channels(
+    target: &Target,
+    width: u32,
+    height: u32,
+    channels: Channels,
+    attributes: HashMap<Text, AttributeValue>,
+) -> Result<(), OutputError> {
+    let mut layer_attributes = LayerAttributes {
         software_name: Some(Text::from(concat!("mixray ", env!("CARGO_PKG_VERSION")))),
         ..LayerAttributes::default()
     };
-    attributes.other = metadata.attributes();
-    let size = Vec2(picture.width as usize, picture.height as usize);
+    layer_attributes.other = attributes;
     let layer = Layer::new(
-        size,
-        attributes,
+        Vec2(width as usize, height as usize),
+        layer_attributes,
         Encoding::SMALL_LOSSLESS,
         AnyChannels::sort(channels),
     );

@@ -1,13 +1,19 @@
 //! Pictures to files: PNG and multilayer EXR, written beside the target and renamed, so that no broken picture is ever left.
 
+mod channels;
 mod exr_file;
+mod film_file;
 mod png_file;
+mod reference_file;
 mod target;
 
+pub use channels::ChannelFile;
 pub use exr_file::{Metadata, write_exr};
+pub use film_file::{FilmNote, read_film, write_film};
 pub use png_file::{PngBits, write_png};
+pub use reference_file::write_reference;
 pub(crate) use target::check_writable;
-pub use target::{Format, Target, write_text};
+pub use target::{Format, Target, write_bytes, write_text};
 
 use std::path::PathBuf;
 

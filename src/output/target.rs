@@ -59,8 +59,16 @@ pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
 /// # Errors
 /// If the file cannot be written; what was there before then still is.
 pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
+    write_bytes(path, text.as_bytes())
+}
+
+/// Replaces the file at `path` by `bytes`.
+///
+/// # Errors
+/// If the file cannot be written; what was there before then still is.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     write_atomically(path, |file| {
-        file.write_all(text.as_bytes())
+        file.write_all(bytes)
             .map_err(|source| io_error(path, source))
     })
 }

@@ -19,6 +19,7 @@
 
 mod control;
 mod photo_albedo;
+mod skips;
 mod stats;
 
 use std::sync::Arc;
@@ -27,10 +28,11 @@ use std::time::Instant;
 use glam::DMat4;
 
 pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
-pub use stats::Stats;
+pub use skips::{Skip, Without};
+pub use stats::{Stats, StatsRays};
 
 use crate::cpu;
-use crate::film::{Film, Picture, Planes, composite, planes};
+use crate::film::{Film, MergeError, Picture, Planes, composite, planes};
 use crate::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError};
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Side};
@@ -46,6 +48,8 @@ pub struct RendererOptions {
     /// The first and the end of the samples to render of each pixel's `rays_per_pixel`; `None`: all. Films of ranges that follow one
     /// another are put together by [`Renderer::merge`].
     pub sample_range: Option<(u32, u32)>,
+    /// Savings to do without.
+    pub without: Without,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -133,6 +137,7 @@ impl Renderer {
     /// Runs the pilot and begins the film that follows its plan.
     fn look_ahead(&mut self) {
         cpu::pilot(&mut self.packed);
+        self.options.without.apply(&mut self.packed.pixels);
         self.film = Film::new(
             self.film.width,
             self.film.height,
@@ -149,8 +154,9 @@ impl Renderer {
             BackendChoice::Gpu => AdapterChoice::Any,
             BackendChoice::Auto => AdapterChoice::Hardware,
         };
-        let opened =
-            GpuDevice::open(choice).and_then(|gpu| GpuBackend::new(Arc::new(gpu), &self.packed));
+        let specialised = !self.options.without.contains(Skip::Specialisation);
+        let opened = GpuDevice::open(choice)
+            .and_then(|gpu| GpuBackend::new(Arc::new(gpu), &self.packed, specialised));
         match opened {
             Ok(gpu) => Ok(Backend::Gpu(Box::new(gpu))),
             Err(error) if self.scene.settings.backend == BackendChoice::Auto => {
@@ -257,9 +263,32 @@ impl Renderer {
 
     /// Short beside the main passes, and without it edge pixels would not be Eq. 4: not cancelled.
     fn replay_real(&mut self) -> Result<(), RenderError> {
-        let everywhere =
-            self.options.all_planes || self.scene.settings.composite == Composite::Quotient;
+        let everywhere = self.options.all_planes
+            || self.scene.settings.composite == Composite::Quotient
+            || self.options.without.contains(Skip::EdgeReal);
         self.run_pass(Pass::Real { everywhere }, &Cancel::new(&|| false, None))
+    }
+
+    /// A renderer that goes on from the film of an earlier one of the same scene and settings: it stands at the film's last sample, and traces
+    /// what edge pixels lack.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`]; or the film is of another size than the camera.
+    pub fn with_film(scene: Scene, film: Film) -> Result<Self, RenderError> {
+        let size = (scene.camera.width, scene.camera.height);
+        if (film.width, film.height) != size {
+            let sizes = MergeError::Size(film.width, film.height, size.0, size.1);
+            return Err(sizes.into());
+        }
+        let options = RendererOptions {
+            all_planes: !film.guides.is_empty(),
+            sample_range: Some((film.first_sample, scene.settings.rays_per_pixel)),
+            without: Without::default(),
+        };
+        let mut renderer = Self::new(scene, options)?;
+        renderer.film = film;
+        renderer.replay_real()?;
+        Ok(renderer)
     }
 
     /// Adds the film of another renderer of the same scene whose samples come just before or just after this one's, and traces what edge
@@ -272,6 +301,20 @@ impl Renderer {
         let end = self.film.first_sample + self.samples();
         self.end_sample = self.end_sample.max(end);
         self.replay_real()
+    }
+
+    /// Another number of rays per pixel and another seed. Nothing is rebuilt but the pilot; the film starts anew with all samples to render.
+    ///
+    /// # Errors
+    /// As [`Renderer::set_lens`].
+    pub fn set_samples(&mut self, rays_per_pixel: u32, seed: u32) -> Result<(), RenderError> {
+        self.scene.settings.rays_per_pixel = rays_per_pixel;
+        self.scene.settings.seed = seed;
+        self.packed.frame.rays_total = rays_per_pixel;
+        self.packed.frame.seed = seed;
+        self.film.first_sample = 0;
+        self.end_sample = rays_per_pixel;
+        self.restart(false)
     }
 
     /// Another lens. Nothing is rebuilt but the pilot; the film starts anew.

@@ -1,8 +1,8 @@
 //! What a render took, for programs: the record behind `--stats`.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::Renderer;
+use super::{RayTotals, Renderer};
 use crate::film::PixelCounts;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -33,13 +33,25 @@ pub struct StatsSeconds {
 }
 
 /// Rays traced, by the paper's kinds. Primary rays are among the mixed and real ones too.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StatsRays {
     pub primary: u64,
     pub mixed: u64,
     pub real: u64,
     pub mixed_shadow: u64,
     pub real_shadow: u64,
+}
+
+impl From<RayTotals> for StatsRays {
+    fn from(rays: RayTotals) -> Self {
+        Self {
+            primary: rays.primary,
+            mixed: rays.mixed,
+            real: rays.real,
+            mixed_shadow: rays.mixed_shadow,
+            real_shadow: rays.real_shadow,
+        }
+    }
 }
 
 impl Stats {
@@ -55,13 +67,7 @@ impl Stats {
                 render: seconds.render,
                 write: write_secs,
             },
-            rays: StatsRays {
-                primary: rays.primary,
-                mixed: rays.mixed,
-                real: rays.real,
-                mixed_shadow: rays.mixed_shadow,
-                real_shadow: rays.real_shadow,
-            },
+            rays: rays.into(),
             pixels: renderer.film().counts(),
             non_finite_samples: renderer.film().non_finite_samples(),
             backend: renderer.backend_name().to_owned(),

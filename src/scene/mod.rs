@@ -7,6 +7,7 @@ mod camera;
 mod environment;
 mod error;
 mod file;
+mod fingerprint;
 pub mod gltf;
 mod image_file;
 mod light;

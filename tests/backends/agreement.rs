@@ -137,7 +137,8 @@ pub fn gpu_film(
 }
 
 pub fn backend_for(gpu: &Arc<GpuDevice>, renderer: &Renderer) -> GpuBackend {
-    GpuBackend::new(Arc::clone(gpu), renderer.packed()).unwrap_or_else(|error| panic!("{error}"))
+    GpuBackend::new(Arc::clone(gpu), renderer.packed(), true)
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Renders the case on both backends, and two perturbed ones that must be told apart.

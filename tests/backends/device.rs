@@ -93,7 +93,7 @@ fn a_scene_beyond_the_limits_of_the_device_is_refused() {
     let scene = load(&case("textures_and_normal_maps_in_the_sun").text());
     let built = renderer(scene, false);
     let refused = |gpu: GpuDevice, part: &str| {
-        match GpuBackend::new(Arc::new(gpu), built.packed()) {
+        match GpuBackend::new(Arc::new(gpu), built.packed(), true) {
             Err(error @ GpuError::Limit { .. }) => {
                 let message = error.to_string();
                 assert!(message.contains(part), "{message}");
@@ -111,6 +111,6 @@ fn a_scene_beyond_the_limits_of_the_device_is_refused() {
 
     // Negative control: the same scene within the limits, and the CPU takes it in any case.
     let gpu = GpuDevice::open(AdapterChoice::Any).expect("opens");
-    assert!(GpuBackend::new(Arc::new(gpu), built.packed()).is_ok());
+    assert!(GpuBackend::new(Arc::new(gpu), built.packed(), true).is_ok());
     assert!(cpu_film(&built, false).1.traced() > 0);
 }

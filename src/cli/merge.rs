@@ -1,0 +1,135 @@
+//! `mixray merge`: films of sample ranges to one picture.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+use super::render::{png_bits, write};
+use super::{Failure, Outcome, print, say};
+use crate::film::Film;
+use crate::output::{FilmNote, PngBits, Target, read_film};
+use crate::renderer::Renderer;
+use crate::scene::{self, BackendChoice, Scene};
+
+/// Puts films of sample ranges together
+///
+/// The parts come from `mixray render --range` and must be of one render: same scene, seed, sampler, estimator and rays per pixel in all.
+/// Their ranges must follow one another; their order here does not matter. The result equals one render of all of them.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Parts (.exr)
+    #[arg(required = true)]
+    parts: Vec<PathBuf>,
+    /// Picture to write, .png or .exr with all planes (an incomplete range stays mergeable); may be given several times
+    #[arg(short, long, value_name = "OUT", required = true)]
+    output: Vec<PathBuf>,
+    /// Scene file [default: where it was when the first part was rendered]
+    #[arg(long)]
+    scene: Option<PathBuf>,
+    /// Bits a channel of PNG pictures [default: 16 for a 16-bit photograph, else 8]
+    #[arg(long, value_parser = PossibleValuesParser::new(["8", "16"]).map(png_bits))]
+    png_bits: Option<PngBits>,
+}
+
+struct Part<'a> {
+    path: &'a Path,
+    film: Film,
+    note: FilmNote,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let targets = arguments
+        .output
+        .iter()
+        .map(|path| Target::picture(path))
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut parts = Vec::new();
+    for path in &arguments.parts {
+        let (film, note) = read_film(path).map_err(Failure)?;
+        parts.push(Part { path, film, note });
+    }
+    parts.sort_by_key(|part| part.note.range);
+    check(&parts)?;
+    let mut parts = parts.into_iter();
+    let Some(first) = parts.next() else {
+        return Err(Failure("there is nothing to merge".to_owned()));
+    };
+    let scene = load(&first, arguments.scene.as_deref())?;
+    let (mut film, mut range) = (first.film, first.note.range);
+    for part in parts {
+        film.merge(&part.film)
+            .map_err(|error| Failure(format!("{}: {error}", part.path.display())))?;
+        range.1 = part.note.range.1;
+    }
+    let total = first.note.total;
+    let renderer = Renderer::with_film(scene, film)?;
+    let complete = range == (0, total);
+    write(&renderer, &targets, arguments.png_bits, !complete)?;
+    let mut out = String::new();
+    for target in &targets {
+        out += &format!(
+            "picture {} (rays {}..{} of {total} per pixel)\n",
+            target.path().display(),
+            range.0,
+            range.1
+        );
+    }
+    print(&out);
+    Ok(Outcome::Done)
+}
+
+/// That they are parts of one render, made by this program, one after the other.
+fn check(parts: &[Part]) -> Result<(), Failure> {
+    for pair in parts.windows(2) {
+        let [a, b] = pair else { continue };
+        let refuse = |problem: String| {
+            let (a, b) = (a.path.display(), b.path.display());
+            Err(Failure(format!("{a} and {b} cannot be merged: {problem}")))
+        };
+        if let Some(problem) = a.note.mismatch(&b.note) {
+            return refuse(problem);
+        }
+        let ((from, to), (next, end)) = (a.note.range, b.note.range);
+        if to != next {
+            let problem = if to > next { "overlap" } else { "leave a gap" };
+            return refuse(format!(
+                "the ranges {from}..{to} and {next}..{end} {problem}"
+            ));
+        }
+    }
+    match parts.first() {
+        Some(part) if part.note.version != env!("CARGO_PKG_VERSION") => Err(Failure(format!(
+            "{}: was rendered by version {}, this is {}; render the parts again",
+            part.path.display(),
+            part.note.version,
+            env!("CARGO_PKG_VERSION")
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The scene as it was rendered.
+fn load(part: &Part, given: Option<&Path>) -> Result<Scene, Failure> {
+    let path = given.unwrap_or(Path::new(&part.note.scene));
+    if given.is_none() && !path.exists() {
+        return Err(Failure(format!(
+            "the scene is no longer at {}; say where it is with --scene",
+            path.display()
+        )));
+    }
+    let mut scene = scene::load(path)?;
+    scene.settings.apply(&part.note.overrides());
+    scene.settings.backend = BackendChoice::Cpu;
+    for warning in &scene.warnings {
+        say("warning", warning);
+    }
+    if scene.fingerprint() != part.note.fingerprint {
+        return Err(Failure(format!(
+            "{}: is not the scene that {} was rendered from, or it has changed since",
+            path.display(),
+            part.path.display()
+        )));
+    }
+    Ok(scene)
+}

@@ -1,0 +1,28 @@
+//! A converged picture with its standard error, for benchmarks.
+
+use super::exr_file::{Channels, push_channel, push_three, text_value, write_channels};
+use super::{OutputError, Target};
+use crate::film::Picture;
+use exr::prelude::Text;
+
+/// Writes the picture as R, G, B, its standard error as the layer `error`, the mask, and text attributes.
+///
+/// # Errors
+/// If the file cannot be written; what was there before then still is.
+pub fn write_reference(
+    target: &Target,
+    picture: &Picture,
+    standard_error: &[[f32; 3]],
+    mask: &[f32],
+    texts: &[(&str, String)],
+) -> Result<(), OutputError> {
+    let mut channels = Channels::new();
+    push_three(&mut channels, "", ["R", "G", "B"], &picture.linear);
+    push_three(&mut channels, "error.", ["R", "G", "B"], standard_error);
+    push_channel(&mut channels, "mask.Y", mask.to_vec());
+    let attributes = texts
+        .iter()
+        .map(|(name, text)| (Text::from(*name), text_value(text)))
+        .collect();
+    write_channels(target, picture.width, picture.height, channels, attributes)
+}

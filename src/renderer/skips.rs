@@ -1,0 +1,102 @@
+//! The savings that can be switched off, to measure what each is worth.
+
+use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PixelInfo};
+use crate::scene::Choice;
+
+/// Work that is left out because it cannot matter, or seldom does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Skip {
+    /// No ray is traced for pixels that nothing virtual can reach. Proven: the result is the same.
+    OutOfReach,
+    /// The pilot's plan: more samples where they lower the error most, the difference at one in several elsewhere. The expectation is the same.
+    Plan,
+    /// No virtual primary ray where the lens beam passes all virtual objects by. Proven: the expectation is the same.
+    Beams,
+    /// The real ray behind a virtual hit is traced in edge pixels alone. Proven: the result is the same.
+    EdgeReal,
+    /// Shaders hold the code that the scene needs and no more (GPU). The result is the same to rounding.
+    Specialisation,
+}
+
+impl Choice for Skip {
+    const CHOICES: &'static [(&'static str, Self)] = &[
+        ("out-of-reach", Self::OutOfReach),
+        ("plan", Self::Plan),
+        ("beams", Self::Beams),
+        ("edge-real", Self::EdgeReal),
+        ("specialisation", Self::Specialisation),
+    ];
+}
+
+/// Savings that are switched off; none by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Without(u8);
+
+impl Without {
+    pub fn contains(self, skip: Skip) -> bool {
+        self.0 & bit(skip) != 0
+    }
+
+    /// Takes the pixels' share of the savings back.
+    pub(super) fn apply(self, pixels: &mut [PixelInfo]) {
+        if self == Self::default() {
+            return;
+        }
+        for pixel in pixels {
+            if self.contains(Skip::OutOfReach) {
+                pixel.flags &= !PIXEL_OUT_OF_REACH;
+            }
+            if self.contains(Skip::Beams) && pixel.flags & PIXEL_OUT_OF_REACH == 0 {
+                pixel.flags |= PIXEL_BEAM_MAY_MEET_VIRTUAL;
+            }
+            if self.contains(Skip::Plan) {
+                *pixel = PixelInfo::uniform(pixel.flags);
+            }
+        }
+    }
+}
+
+impl FromIterator<Skip> for Without {
+    fn from_iter<I: IntoIterator<Item = Skip>>(skips: I) -> Self {
+        Self(skips.into_iter().fold(0, |bits, skip| bits | bit(skip)))
+    }
+}
+
+fn bit(skip: Skip) -> u8 {
+    1 << skip as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_switch_takes_back_its_own() {
+        let pixel = PixelInfo {
+            difference_period: 8,
+            sample_factor: 2,
+            flags: PIXEL_OUT_OF_REACH,
+        };
+        let after = |skips: &[Skip]| {
+            let mut pixels = [pixel];
+            skips
+                .iter()
+                .copied()
+                .collect::<Without>()
+                .apply(&mut pixels);
+            pixels[0]
+        };
+        assert_eq!(after(&[]), pixel);
+        assert_eq!(after(&[Skip::EdgeReal, Skip::Specialisation]), pixel);
+        assert_eq!(after(&[Skip::Plan]), PixelInfo::uniform(pixel.flags));
+        assert_eq!(after(&[Skip::OutOfReach]).flags, 0);
+        assert_eq!(after(&[Skip::Beams]), pixel, "no ray, no beam");
+        let both = after(&[Skip::Beams, Skip::OutOfReach]);
+        assert_eq!(both.flags, PIXEL_BEAM_MAY_MEET_VIRTUAL);
+        for (name, skip) in Skip::CHOICES {
+            let without: Without = [*skip].into_iter().collect();
+            let on = Skip::CHOICES.iter().filter(|(_, s)| without.contains(*s));
+            assert_eq!(on.count(), 1, "{name}");
+        }
+    }
+}

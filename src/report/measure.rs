@@ -1,0 +1,304 @@
+//! Methods rendered in turns.
+
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+
+use super::{Errors, Method, Row, Run, Truth};
+use crate::film::Picture;
+use crate::renderer::{Budget, RayTotals, RenderError, Renderer, RendererOptions, StatsRays};
+use crate::scene::{BackendChoice, Scene};
+
+/// What to measure on a scene.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub methods: Vec<Method>,
+    /// Ascending.
+    pub rays_per_pixel: Vec<u32>,
+    /// Each row is rendered this often, with another seed each.
+    pub repeats: u32,
+    pub first_seed: u32,
+    /// `--backend gpu` is a hardware GPU here: processor seconds say nothing of its work.
+    pub hardware_gpu: bool,
+}
+
+#[derive(Debug, thiserror::Error)]
+pub enum MeasureError {
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    #[error("{method} was asked for, but {reason}")]
+    Replaced { method: String, reason: String },
+    #[error("the picture has {0}x{1} pixels, its reference {2}x{3}")]
+    Size(u32, u32, u32, u32),
+}
+
+/// A picture to look at: the first run of a method at some number of rays.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    pub scene: String,
+    pub method: Method,
+    pub rays_per_pixel: u32,
+    pub picture: Picture,
+}
+
+/// Renders every method at every number of rays, all of them once before any of them again, after one untimed run of each method at the
+/// fewest rays. `truth` gives the reference for a method, without which its errors stay 0; `tick` hears what is about to be rendered. Once `cancelled` says so, what is
+/// complete is returned.
+///
+/// # Errors
+/// A method cannot render the scene, another backend had to take over, or a reference has another size.
+pub fn measure<'a>(
+    scene: &Scene,
+    plan: &Plan,
+    truth: &dyn Fn(&Method) -> Option<&'a Truth>,
+    cancelled: &(dyn Fn() -> bool + Sync),
+    tick: &mut dyn FnMut(&str),
+) -> Result<(Vec<Row>, Vec<Shot>), MeasureError> {
+    let (width, height) = (scene.camera.width, scene.camera.height);
+    let mut subjects = Vec::new();
+    for method in &plan.methods {
+        if let Some(Truth { picture, .. }) = truth(method)
+            && (picture.width, picture.height) != (width, height)
+        {
+            let (w, h) = (picture.width, picture.height);
+            return Err(MeasureError::Size(width, height, w, h));
+        }
+        tick(&format!("{}: {}, warm-up", scene.name, method.label()));
+        let mut subject = Subject::new(scene, *method)?;
+        let fewest = plan.rays_per_pixel.first().copied().unwrap_or(1);
+        subject.render(fewest, plan.first_seed, cancelled)?;
+        subject.check_backend()?;
+        subjects.push(subject);
+    }
+
+    let counts = plan.rays_per_pixel.len();
+    let shown = [0, counts / 2, counts.saturating_sub(1)];
+    let mut cells: Vec<Vec<Sample>> = vec![Vec::new(); counts * subjects.len()];
+    let mut shots = Vec::new();
+    'runs: for repeat in 0..plan.repeats {
+        let seed = plan.first_seed.wrapping_add(repeat);
+        for (level, &rays_per_pixel) in plan.rays_per_pixel.iter().enumerate() {
+            for turn in 0..subjects.len() {
+                // Another method begins in every repetition.
+                let at = (turn + repeat as usize) % subjects.len();
+                let subject = &mut subjects[at];
+                tick(&format!(
+                    "{}: {}, {rays_per_pixel} rays per pixel",
+                    scene.name,
+                    subject.method.label()
+                ));
+                let (mut sample, picture) = subject.render(rays_per_pixel, seed, cancelled)?;
+                if cancelled() {
+                    break 'runs;
+                }
+                subject.check_backend()?;
+                if let Some(truth) = truth(&subject.method) {
+                    sample.errors = Errors::of(&picture, truth);
+                }
+                cells[level * plan.methods.len() + at].push(sample);
+                if repeat == 0 && shown.contains(&level) {
+                    shots.push(Shot {
+                        scene: scene.name.clone(),
+                        method: subject.method,
+                        rays_per_pixel,
+                        picture,
+                    });
+                }
+            }
+        }
+    }
+
+    let mut rows = Vec::new();
+    for (at, subject) in subjects.iter().enumerate() {
+        for (level, &rays_per_pixel) in plan.rays_per_pixel.iter().enumerate() {
+            let samples = &cells[level * subjects.len() + at];
+            if !samples.is_empty() {
+                rows.push(subject.row(rays_per_pixel, samples, plan.hardware_gpu));
+            }
+        }
+    }
+    Ok((rows, shots))
+}
+
+/// One run.
+#[derive(Clone, Debug)]
+struct Sample {
+    seed: u32,
+    wall_secs: f64,
+    setup_secs: f64,
+    cpu_secs: f64,
+    rays: RayTotals,
+    skipped_fraction: f64,
+    non_finite: u64,
+    errors: Errors,
+}
+
+/// A method with its renderer, which stays built between runs.
+struct Subject {
+    method: Method,
+    renderer: Renderer,
+    build_secs: f64,
+    compile_secs: f64,
+}
+
+impl Subject {
+    fn new(scene: &Scene, method: Method) -> Result<Self, RenderError> {
+        let mut scene = scene.clone();
+        let settings = &mut scene.settings;
+        settings.backend = method.backend;
+        settings.estimator = method.estimator;
+        settings.sampler = method.sampler;
+        settings.composite = method.composite;
+        let options = RendererOptions {
+            without: method.without.into_iter().collect(),
+            ..RendererOptions::default()
+        };
+        let renderer = Renderer::new(scene, options)?;
+        let seconds = renderer.seconds();
+        Ok(Self {
+            method,
+            renderer,
+            build_secs: seconds.build,
+            compile_secs: seconds.compile,
+        })
+    }
+
+    /// A lost device is replaced by the CPU, which is right for a render and wrong for its time.
+    fn check_backend(&self) -> Result<(), MeasureError> {
+        let asked_for_gpu = self.method.backend == BackendChoice::Gpu;
+        if asked_for_gpu && self.renderer.backend_name() != "gpu" {
+            return Err(MeasureError::Replaced {
+                method: self.method.label(),
+                reason: self.renderer.notes().join("; "),
+            });
+        }
+        Ok(())
+    }
+
+    fn render(
+        &mut self,
+        rays_per_pixel: u32,
+        seed: u32,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(Sample, Picture), RenderError> {
+        let before = self.renderer.rays();
+        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        self.renderer.set_samples(rays_per_pixel, seed)?;
+        let setup_secs = wall.elapsed().as_secs_f64();
+        self.renderer
+            .advance(Budget::Complete, cancelled, &mut |_| ())?;
+        let picture = self.renderer.picture();
+        let (wall_secs, cpu_secs) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        let film = self.renderer.film();
+        let sample = Sample {
+            seed,
+            wall_secs,
+            setup_secs,
+            cpu_secs,
+            rays: since(self.renderer.rays(), before),
+            skipped_fraction: film.counts().skipped as f64 / film.pixels.len().max(1) as f64,
+            non_finite: film.non_finite_samples(),
+            errors: Errors::default(),
+        };
+        Ok((sample, picture))
+    }
+
+    fn row(&self, rays_per_pixel: u32, samples: &[Sample], hardware_gpu: bool) -> Row {
+        let values = |pick: fn(&Sample) -> f64| samples.iter().map(pick).collect::<Vec<f64>>();
+        let wall = values(|s| s.wall_secs);
+        let cpu = values(|s| s.cpu_secs);
+        let mse = values(|s| s.errors.all.mse);
+        let rays = mean_rays(samples);
+        let traced = rays.mixed + rays.real + rays.mixed_shadow + rays.real_shadow;
+        let errors = Errors::mean(&samples.iter().map(|s| s.errors).collect::<Vec<_>>());
+        let (wall_secs, cpu_secs) = (mean(&wall), mean(&cpu));
+        let by_wall = hardware_gpu && self.method.backend == BackendChoice::Gpu;
+        let cost_secs = if by_wall { wall_secs } else { cpu_secs };
+        let product = cost_secs * errors.all.mse;
+        let film = self.renderer.film();
+        Row {
+            scene: self.renderer.scene().name.clone(),
+            width: film.width,
+            height: film.height,
+            method: self.method,
+            device: self.renderer.device_name(),
+            rays_per_pixel,
+            build_secs: self.build_secs,
+            compile_secs: self.compile_secs,
+            wall_secs,
+            wall_secs_sd: deviation(&wall),
+            setup_secs: mean(&values(|s| s.setup_secs)),
+            cpu_secs,
+            cpu_secs_sd: deviation(&cpu),
+            rays,
+            mrays_per_sec: traced as f64 / wall_secs.max(1e-9) / 1e6,
+            skipped_fraction: mean(&values(|s| s.skipped_fraction)),
+            non_finite_samples: samples.iter().map(|s| s.non_finite).sum(),
+            errors,
+            mse_sd: deviation(&mse),
+            cost: if by_wall { "wall" } else { "cpu" }.to_owned(),
+            efficiency: (product > 0.0).then(|| 1.0 / product),
+            runs: samples
+                .iter()
+                .map(|s| Run {
+                    seed: s.seed,
+                    wall_secs: s.wall_secs,
+                    cpu_secs: s.cpu_secs,
+                    mse: s.errors.all.mse,
+                })
+                .collect(),
+        }
+    }
+}
+
+fn since(now: RayTotals, before: RayTotals) -> RayTotals {
+    RayTotals {
+        primary: now.primary - before.primary,
+        mixed: now.mixed - before.mixed,
+        real: now.real - before.real,
+        mixed_shadow: now.mixed_shadow - before.mixed_shadow,
+        real_shadow: now.real_shadow - before.real_shadow,
+    }
+}
+
+fn mean_rays(samples: &[Sample]) -> StatsRays {
+    let mut sum = RayTotals::default();
+    for sample in samples {
+        sum += sample.rays;
+    }
+    let mean = |total: u64| total / samples.len().max(1) as u64;
+    RayTotals {
+        primary: mean(sum.primary),
+        mixed: mean(sum.mixed),
+        real: mean(sum.real),
+        mixed_shadow: mean(sum.mixed_shadow),
+        real_shadow: mean(sum.real_shadow),
+    }
+    .into()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Standard deviation of a sample, 0 of a single value.
+fn deviation(values: &[f64]) -> f64 {
+    if values.len() < 2 {
+        return 0.0;
+    }
+    let mean = mean(values);
+    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    (squares / (values.len() - 1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deviations_against_hand_computed_ones() {
+        assert_eq!(mean(&[1.0, 2.0, 6.0]), 3.0);
+        assert!((deviation(&[1.0, 2.0, 6.0]) - 7.0f64.sqrt()).abs() < 1e-12);
+        assert_eq!(deviation(&[5.0]), 0.0);
+    }
+}

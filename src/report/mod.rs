@@ -1,0 +1,36 @@
+//! Time against error: what `mixray bench` measures and what is made of it.
+//!
+//! [`measure`] renders methods in turns against a [`Truth`] that [`reference`] makes; [`Report`] keeps the figures, and the other modules
+//! make tables, plots and a page of it or compare it with an earlier one.
+
+mod against;
+mod docs;
+mod errors;
+mod fit;
+mod machine;
+mod measure;
+mod page;
+mod paper;
+mod pictures;
+mod plot;
+mod record;
+mod reference;
+mod shrink;
+mod table;
+
+pub use against::{Change, Verdict, against};
+pub use docs::replace_section;
+pub use errors::{Errors, Figures, Truth};
+pub use fit::{Reach, cost_to_reach, log_log_slope};
+pub use machine::Machine;
+pub use measure::{MeasureError, Plan, Shot, measure};
+pub use page::page;
+pub use paper::{
+    PAPER_SCENE, PaperRow, paper_markdown, paper_rays_per_pixel, paper_rows, paper_text,
+};
+pub use pictures::{difference_png, picture_png};
+pub use plot::{Axis, Plot, PlotError, plots};
+pub use record::{FORMAT, Method, ReferenceNote, Report, Row, Run, Target};
+pub use reference::{Reference, ReferenceError, ReferenceGoal, Source, reference};
+pub use shrink::shrink;
+pub use table::{csv, markdown, text};
