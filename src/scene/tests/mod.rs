@@ -2,6 +2,7 @@
 
 mod accepted;
 mod images;
+mod mutations;
 mod refused;
 
 use std::path::{Path, PathBuf};
