@@ -338,8 +338,13 @@ fn shading_points_agree_with_their_twin() {
     let differ = outliers(&expected(&scene), &got, 2e-5, 2e-5);
     eprintln!("{differ} of {} differ", inputs.len());
     assert!(differ <= 20, "{differ} of {}", inputs.len());
-    // Negative control: another normal map strength.
+    // Negative controls: other medians of the photograph's albedo, another normal map strength.
     let mut other = scene;
+    let pixels = (other.frame.width * other.frame.height) as usize;
+    other.photo_albedo[pixels..].rotate_left(1);
+    let differ = outliers(&expected(&other), &got, 2e-5, 2e-5);
+    assert!(differ > 500, "{differ}");
+    other.photo_albedo[pixels..].rotate_right(1);
     for material in &mut other.materials {
         material.normal_scale *= 1.01;
     }
