@@ -221,7 +221,6 @@ pub struct Material {
     pub emissive: [f32; 3],
     pub emissive_texture: Option<TextureRef>,
     pub alpha_mode: AlphaMode,
-    pub double_sided: bool,
     /// Emits its base colour and scatters nothing.
     pub unlit: bool,
     pub ior: f32,
@@ -264,7 +263,6 @@ impl Default for Material {
             emissive: [0.0; 3],
             emissive_texture: None,
             alpha_mode: AlphaMode::Opaque,
-            double_sided: true,
             unlit: false,
             ior: 1.5,
             specular: 1.0,
