@@ -1,6 +1,6 @@
 //! `mixray render`: a scene file to pictures.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
@@ -8,7 +8,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::{Failure, Outcome, interrupt, print, progress, say, summary};
 use crate::output::{
-    Format, Metadata, PngBits, Target, check_writable, write_exr, write_png, write_text,
+    Format, Metadata, PngBits, Target, check_distinct, check_writable, write_exr, write_png,
+    write_text,
 };
 use crate::renderer::{Budget, Renderer, RendererOptions, Stats};
 use crate::scene::{
@@ -128,6 +129,10 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         )))?],
         given => given.to_vec(),
     };
+    let outputs: Vec<&Path> = (targets.iter().map(Target::path))
+        .chain(job.stats.as_deref())
+        .collect();
+    check_distinct(&outputs, &scene.inputs)?;
     let load_secs = start.elapsed().as_secs_f64();
 
     let options = RendererOptions {

@@ -53,6 +53,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     pub objects: Vec<Object>,
     pub settings: Settings,
+    /// The files that the scene is made of, its own included.
+    pub inputs: Vec<PathBuf>,
     /// Things worth telling the user that are not errors (dropped triangles, ignored gamma chunks).
     pub warnings: Vec<String>,
 }

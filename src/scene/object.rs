@@ -60,15 +60,16 @@ impl<'w> ObjectReader<'w> {
         }
     }
 
-    /// All of `[[real]]`, then all of `[[virtual]]`, and the lights that came with them.
-    pub fn read_all(mut self, root: &Table) -> Result<(Vec<Object>, Vec<Light>)> {
+    /// All of `[[real]]`, then all of `[[virtual]]`, the lights that came with them, and the files that their meshes name.
+    pub fn read_all(mut self, root: &Table) -> Result<(Vec<Object>, Vec<Light>, Vec<PathBuf>)> {
         let mut objects = Vec::new();
         for (key, side) in [("real", Side::Real), ("virtual", Side::Virtual)] {
             for node in root.list(key)? {
                 objects.push(self.read(&node, side)?);
             }
         }
-        Ok((objects, self.lights))
+        let files = self.meshes.values().flat_map(|mesh| mesh.files.clone());
+        Ok((objects, self.lights, files.collect()))
     }
 
     fn read(&mut self, node: &Node, side: Side) -> Result<Object> {

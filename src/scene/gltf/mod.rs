@@ -33,6 +33,8 @@ pub struct GltfScene {
     pub lights: Vec<PlacedLight>,
     /// At least one drawn primitive names a material of its own; the others have glTF's default (white rough metal).
     pub has_materials: bool,
+    /// The files beside this one that its buffers and images name.
+    pub files: Vec<PathBuf>,
     /// One line each; the caller adds the file's name.
     pub warnings: Vec<String>,
 }
@@ -165,7 +167,10 @@ fn load(path: &Path) -> Result<GltfScene, Problem> {
 
     let mut meshes = mesh::Meshes::new(&document);
     let mut materials = material::Materials::new(&document);
-    let mut scene = GltfScene::default();
+    let mut scene = GltfScene {
+        files: document.files(),
+        ..GltfScene::default()
+    };
     for (index, object_from_node) in placed_nodes(&document, &mut notes)? {
         let node = &document.nodes[index];
         if let Some(placed) = &node.extensions.light {
