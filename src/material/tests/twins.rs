@@ -383,7 +383,7 @@ import package::trace::Hit;
         ("clearcoat", &["bsdf_sample_coat"]),
         (
             "rough_specular",
-            &["bsdf_lobes_at", "ggx_ggx_d", "normal_valid_shading_normal"],
+            &["lobes_lobes_at", "ggx_ggx_d", "normal_valid_shading_normal"],
         ),
         ("photo_albedo", &["surface_photo_albedo_at"]),
         ("alpha", &["surface_coverage_of"]),
