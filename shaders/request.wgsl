@@ -173,7 +173,8 @@ fn ray_into(st: ptr<function, PathState>, world: u32, t_max: f32) -> Ray {
 }
 
 fn is_shadow(request: u32) -> bool {
-    return request >= REQUEST_SHADOW_MIXED;
+    return request == REQUEST_SHADOW_MIXED || request == REQUEST_SHADOW_REAL || request == REQUEST_SHADOW_DIFFERENCE
+        || request == REQUEST_SHADOW_PAIR;
 }
 
 @if(alpha)

@@ -90,7 +90,13 @@ pub fn answer(scene: &PackedScene, st: &mut PathState) {
 }
 
 fn is_shadow(request: u32) -> bool {
-    request >= REQUEST_SHADOW_MIXED
+    matches!(
+        request,
+        REQUEST_SHADOW_MIXED
+            | REQUEST_SHADOW_REAL
+            | REQUEST_SHADOW_DIFFERENCE
+            | REQUEST_SHADOW_PAIR
+    )
 }
 
 /// What an any-hit query that met something answers: only `triangle != NONE` means anything.
