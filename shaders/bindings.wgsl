@@ -39,7 +39,6 @@ struct Frame {
     pad_0: f32,
     pad_1: f32,
     pad_2: f32,
-    photo_albedo_median: vec4<f32>,
     spheres: array<vec4<f32>, 16>,
 }
 

@@ -1,9 +1,9 @@
 // Answers a sample's ray request. Rust twin: src/cpu/trace.rs.
 
 import package::bindings::{NONE, frame, materials, triangles, MATERIAL_ALPHA_MASK, MATERIAL_ALPHA_BLEND};
-import package::math::{dot3, hash_combine, uniform_from_bits};
+import package::math::{dot3, hash_combine, length3, uniform_from_bits};
 import package::state::{
-    COINCIDENCE, PathState, miss,
+    COINCIDENCE, FAR, PathState, miss,
     REQUEST_CLOSEST_VIRTUAL, REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_EACH, REQUEST_VIRTUAL_THEN_REAL,
     REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_MIXED, REQUEST_SHADOW_REAL, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
 };
@@ -14,6 +14,7 @@ const MAX_ALPHA_LAYERS: u32 = 64u;
 const WORLD_REAL: u32 = 0u;
 const WORLD_VIRTUAL: u32 = 1u;
 const QUERY_NONE: u32 = 2u;
+const MIN_POSITIVE: f32 = 1.1754944e-38;
 
 // One query of a request: a world (QUERY_NONE: the request is answered) and how far.
 struct Query {
@@ -154,15 +155,26 @@ fn answer(st: ptr<function, PathState>, thread: u32) {
 // Where a ray starts in its own world and in the other one: see src/cpu/trace.rs.
 fn ray_into(st: ptr<function, PathState>, world: u32, t_max: f32) -> Ray {
     let offset = (*st).offset;
-    var origin = (*st).position;
+    var shift = -offset * (*st).coincidence_ratio;
     if world == (*st).side {
-        origin += select(offset, -offset, dot3((*st).direction, offset) < 0.0);
+        shift = select(offset, -offset, dot3((*st).direction, offset) < 0.0);
     } else if world == WORLD_REAL {
-        origin += offset * (*st).coincidence_ratio;
-    } else {
-        origin -= offset * (*st).coincidence_ratio;
+        shift = offset * (*st).coincidence_ratio;
     }
-    return Ray(origin, select(0.0, (*st).real_t_min, world == WORLD_REAL), (*st).direction, t_max, NONE);
+    var direction = (*st).direction;
+    var distance = t_max;
+    if is_shadow((*st).request) && t_max < FAR {
+        let to_end = direction * t_max - shift;
+        distance = length3(to_end);
+        direction = to_end / max(distance, MIN_POSITIVE);
+    }
+    let t_min = select(0.0, (*st).real_t_min, world == WORLD_REAL);
+    return Ray((*st).position + shift, t_min, direction, distance, NONE);
+}
+
+fn is_shadow(request: u32) -> bool {
+    return request == REQUEST_SHADOW_MIXED || request == REQUEST_SHADOW_REAL || request == REQUEST_SHADOW_DIFFERENCE
+        || request == REQUEST_SHADOW_PAIR;
 }
 
 @if(alpha)

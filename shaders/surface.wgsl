@@ -5,6 +5,7 @@ import package::bindings::{
     MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO, MATERIAL_QUAD_LIGHT,
     MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT
 };
+@if(photo_albedo) import package::lens::camera_project;
 import package::math::dot3;
 import package::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
 import package::texture::{slot, slot_rgb, texture_sample};
@@ -113,33 +114,17 @@ fn triangle_emission(triangle: u32, u: f32, v: f32) -> vec3<f32> {
     return emission * surface_alpha(Hit(0.0, u, v, triangle));
 }
 
-fn photo_albedo_at(position: vec3<f32>) -> vec3<f32> {
-    let median = frame.photo_albedo_median.xyz;
-    let offset = position - frame.camera_position.xyz;
-    let depth = -dot3(offset, frame.camera_back.xyz);
-    if depth <= 0.0 {
-        return median;
+@if(photo_albedo)
+fn photo_albedo_at(position: vec3<f32>, object: u32) -> vec3<f32> {
+    let seen = camera_project(position);
+    if seen.valid {
+        let pixel = u32(seen.py) * frame.width + u32(seen.px);
+        let entry = photo_albedo[pixel];
+        if entry.w > 0.0 && abs(entry.w - seen.depth) <= PHOTO_DEPTH_TOLERANCE * seen.depth {
+            return entry.xyz;
+        }
     }
-    let x = dot3(offset, frame.camera_right.xyz) / depth;
-    let y = -dot3(offset, frame.camera_up.xyz) / depth;
-    let k1 = frame.distortion.x;
-    let k2 = frame.distortion.y;
-    let p1 = frame.distortion.z;
-    let p2 = frame.distortion.w;
-    let r2 = x * x + y * y;
-    let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * frame.distortion_k3));
-    let xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
-    let yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
-    let px = floor(frame.intrinsics.x * xd + frame.intrinsics.z);
-    let py = floor(frame.intrinsics.y * yd + frame.intrinsics.w);
-    if !(px >= 0.0 && py >= 0.0 && px < f32(frame.width) && py < f32(frame.height)) {
-        return median;
-    }
-    let seen = photo_albedo[u32(py) * frame.width + u32(px)];
-    if seen.w > 0.0 && abs(seen.w - depth) <= PHOTO_DEPTH_TOLERANCE * depth {
-        return seen.xyz;
-    }
-    return median;
+    return photo_albedo[frame.width * frame.height + object].xyz;
 }
 
 fn perturbed(map: u32, scale: f32, normal: vec3<f32>, v0: Vertex, v1: Vertex, v2: Vertex, b: vec3<f32>) -> vec3<f32> {
@@ -236,7 +221,7 @@ fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
     var flags = entry.flags;
     @if(photo_albedo) {
         if (flags & MATERIAL_PHOTO_ALBEDO) != 0u {
-            base_color = photo_albedo_at(position);
+            base_color = photo_albedo_at(position, triangle.object);
             flags |= MATERIAL_LAMBERTIAN;
         }
     }

@@ -196,6 +196,63 @@ fn unwritable_outputs_are_refused_before_any_work() {
     );
 }
 
+/// No output may replace a file that the scene is made of, however it is named.
+#[test]
+fn inputs_are_never_overwritten() {
+    let folder = Folder::new(&CAMERA.replace("photo.png", "sub/../photo.png"));
+    std::fs::create_dir(folder.path("sub")).unwrap();
+    let photo = std::fs::read(folder.path("photo.png")).unwrap();
+    let scene = std::fs::read(folder.path("scene.toml")).unwrap();
+    let render = |arguments: &[&str]| {
+        let common = ["render", "scene.toml", "--backend", "cpu"];
+        folder.run(&[&common, arguments].concat())
+    };
+    let made_of = "the scene is made of this file";
+    assert_refused(&render(&["-o", "photo.png"]), made_of);
+    assert_refused(&render(&["-o", "./sub/../photo.png"]), made_of);
+    assert_refused(&render(&["-o", "a.png", "--stats", "scene.toml"]), made_of);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("photo.png", folder.path("link.png")).unwrap();
+        assert_refused(&render(&["-o", "link.png"]), made_of);
+        std::fs::remove_file(folder.path("link.png")).unwrap();
+    }
+    // The default name is refused as well.
+    let name = folder.0.path().file_name().unwrap().to_string_lossy();
+    let default_name = format!("{name}.png");
+    std::fs::rename(folder.path("photo.png"), folder.path(&default_name)).unwrap();
+    let text = CAMERA.replace("photo.png", &default_name);
+    std::fs::write(folder.path("scene.toml"), text).unwrap();
+    assert_refused(&render(&[]), made_of);
+    std::fs::rename(folder.path(&default_name), folder.path("photo.png")).unwrap();
+    std::fs::write(folder.path("scene.toml"), &scene).unwrap();
+    assert_refused(
+        &render(&["-o", "a.png", "-o", "sub/../a.png"]),
+        "named for two outputs",
+    );
+    assert_eq!(std::fs::read(folder.path("photo.png")).unwrap(), photo);
+    assert_eq!(folder.entries(), ["photo.png", "scene.toml", "sub"]);
+    // Negative control.
+    let output = render(&["-o", "a.png"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+}
+
+/// The files beside a glTF file are inputs too.
+#[test]
+fn a_models_textures_are_never_overwritten() {
+    let folder = Folder::new(&format!("{CAMERA}[[virtual]]\nmesh = \"model.gltf\"\n"));
+    let model = r#"{ "asset": { "version": "2.0" }, "images": [{ "uri": "wood%20grain.png" }] }"#;
+    std::fs::write(folder.path("model.gltf"), model).unwrap();
+    std::fs::copy(folder.path("photo.png"), folder.path("wood grain.png")).unwrap();
+    let output = folder.run(&["render", "scene.toml", "-o", "wood grain.png"]);
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(
+        message.contains("the scene is made of this file"),
+        "{message}"
+    );
+}
+
 #[test]
 fn bad_usage_is_exit_code_2_and_help_is_0() {
     let folder = Folder::new(CAMERA);

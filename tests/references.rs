@@ -297,11 +297,23 @@ fn sunny_agrees_with_mitsuba() {
 }
 
 /// Small things far away. Changed: the diffuse sphere is a shade darker.
-#[test]
-fn far_agrees_with_mitsuba() {
-    check("far", BackendChoice::Cpu, 24, |scene| {
+fn far_agrees(backend: BackendChoice) {
+    check("far", backend, 24, |scene| {
         change_material(scene, "diffuse sphere", |m| {
             m.base_color = [0.70, 0.70, 0.65, 1.0]
         });
     });
+}
+
+#[test]
+fn far_agrees_with_mitsuba() {
+    far_agrees(BackendChoice::Cpu);
+}
+
+/// The other scenes agree there too; on a software device they take minutes.
+#[test]
+fn far_agrees_with_mitsuba_on_the_gpu() {
+    if mixray::gpu::harness::test_device().is_some() {
+        far_agrees(BackendChoice::Gpu);
+    }
 }

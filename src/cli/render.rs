@@ -1,6 +1,6 @@
 //! `mixray render`: a scene file to pictures.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
@@ -8,8 +8,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::{Failure, Outcome, interrupt, print, progress, say, summary};
 use crate::output::{
-    FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr, write_film, write_png,
-    write_text,
+    FilmNote, Format, Metadata, PngBits, Target, check_distinct, check_writable, write_exr,
+    write_film, write_png, write_text,
 };
 use crate::renderer::{Budget, Renderer, RendererOptions, Skip, Stats, Without};
 use crate::scene::{
@@ -144,6 +144,10 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         )))?],
         given => given.to_vec(),
     };
+    let outputs: Vec<&Path> = (targets.iter().map(Target::path))
+        .chain(job.stats.as_deref())
+        .collect();
+    check_distinct(&outputs, &scene.inputs)?;
     let load_secs = start.elapsed().as_secs_f64();
 
     let options = RendererOptions {

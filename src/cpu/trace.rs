@@ -3,7 +3,7 @@
 use super::state::*;
 use crate::accel::{Hit, Ray};
 use crate::material::surface_alpha;
-use crate::math::{hash_combine, uniform_from_bits};
+use crate::math::{hash_combine, length3, uniform_from_bits};
 use crate::packed::{FRAME_ALPHA, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, NONE, PackedScene};
 
 /// A ray that meets this many transparent layers ends at the last.
@@ -89,6 +89,16 @@ pub fn answer(scene: &PackedScene, st: &mut PathState) {
     st.hit_virtual = hit_virtual;
 }
 
+fn is_shadow(request: u32) -> bool {
+    matches!(
+        request,
+        REQUEST_SHADOW_MIXED
+            | REQUEST_SHADOW_REAL
+            | REQUEST_SHADOW_DIFFERENCE
+            | REQUEST_SHADOW_PAIR
+    )
+}
+
 /// What an any-hit query that met something answers: only `triangle != NONE` means anything.
 const BLOCKED: Hit = Hit {
     t: 0.0,
@@ -99,22 +109,30 @@ const BLOCKED: Hit = Hit {
 
 /// One world's answer. A ray that leaves a surface starts past it in that surface's own world, so that it does not meet itself. In the other
 /// world it starts as if virtual geometry lay in front of real geometry that coincides with it, as seen from where the path came: a ray
-/// that goes on through a virtual surface then meets the real one, and one that goes back meets it not.
+/// that goes on through a virtual surface then meets the real one, and one that goes back meets it not. A shadow ray ends at the same point
+/// wherever it starts, short of its light: the light must not hide itself.
 fn trace_world(scene: &PackedScene, st: &PathState, world: u32, t_max: f32, any_hit: bool) -> Hit {
-    let origin = if world == st.side {
+    let shift = if world == st.side {
         if st.direction.dot(st.offset) < 0.0 {
-            st.position - st.offset
+            -st.offset
         } else {
-            st.position + st.offset
+            st.offset
         }
     } else if world == WORLD_REAL {
-        st.position + st.offset * st.coincidence_ratio
+        st.offset * st.coincidence_ratio
     } else {
-        st.position - st.offset * st.coincidence_ratio
+        -st.offset * st.coincidence_ratio
     };
+    let mut direction = st.direction;
+    let mut t_max = t_max;
+    if is_shadow(st.request) && t_max < f32::INFINITY {
+        let to_end = st.direction * t_max - shift;
+        t_max = length3(to_end);
+        direction = to_end / t_max.max(f32::MIN_POSITIVE);
+    }
     let mut ray = Ray {
-        origin,
-        direction: st.direction,
+        origin: st.position + shift,
+        direction,
         t_min: if world == WORLD_REAL {
             st.real_t_min
         } else {

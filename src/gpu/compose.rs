@@ -30,6 +30,7 @@ pub const MODULES: &[(&str, &str)] = &[
     ("lanes", include_str!("../../shaders/lanes.wgsl")),
     ("lens", include_str!("../../shaders/lens.wgsl")),
     ("lights", include_str!("../../shaders/lights.wgsl")),
+    ("lobes", include_str!("../../shaders/lobes.wgsl")),
     ("math", include_str!("../../shaders/math.wgsl")),
     ("normal", include_str!("../../shaders/normal.wgsl")),
     ("rectangle", include_str!("../../shaders/rectangle.wgsl")),

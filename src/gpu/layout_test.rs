@@ -62,7 +62,6 @@ fn host() -> Vec<(&'static str, u32, Fields)> {
             pad_0,
             pad_1,
             pad_2,
-            photo_albedo_median,
             spheres,
         }),
         host_fields!(Vertex {

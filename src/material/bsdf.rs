@@ -12,7 +12,7 @@
 //! diffuse weight looks at the half vector only: smooth and white, index 1.5, it sends 1.02 at 60 degrees and 1.35 at 80, and 1.04 in
 //! the mean over all directions.
 //!
-//! A lobe whose alpha is under [`DELTA_ALPHA`] is a perfect mirror or lens: sampled with `delta` set, absent from [`bsdf_eval`].
+//! A lobe whose alpha is under 1e-3 is a perfect mirror or lens: sampled with `delta` set, absent from [`bsdf_eval`].
 //! Radiance crosses an interface unscaled: what a path carries is radiance over index squared, so that light that enters and leaves
 //! glass needs no factor and a clear glass body in a furnace is invisible (Walter et al. 2007, section 2; Veach 1997, section 5.2).
 //! A thin-walled sheet has both its interfaces in one: R' = 2R/(1+R), and passes light straight on, blurred by its roughness.
@@ -20,28 +20,20 @@
 use glam::Vec3;
 
 use crate::math::{orthonormal_basis, sincos_2pi};
-use crate::packed::{
-    MATERIAL_LAMBERTIAN, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
-};
+use crate::packed::MATERIAL_LAMBERTIAN;
 
-use super::fresnel::{
-    RelativeIndex, fresnel_dielectric, normal_reflectance, refract_about, relative_index, schlick,
+use super::fresnel::{fresnel_dielectric, refract_about};
+use super::ggx::{ggx_reflect, ggx_refract, ggx_sample_half};
+use super::lobes::{
+    Lobes, NO_ALBEDO, coat_delta, cos_to, diffuse_albedo, diffuse_color, grazing_albedo,
+    interface_at, lambert_cos, lobes_at, max3, opaque_fresnel, reflects_delta, scatters_nothing,
+    surface_index, thin_walled, transmits_delta,
 };
-use super::ggx::{MIN_COS, ggx_reflect, ggx_refract, ggx_sample_half};
 use super::normal::unit;
 use super::surface::Surface;
 
-/// GGX alpha under which a lobe counts as perfectly smooth: roughness 0.0316, a blur of a tenth of a degree.
-pub const DELTA_ALPHA: f32 = 1e-3;
-/// A rough interface bends light by about alpha * |ior - 1|; below this the bend is lost in f32 and light goes through unblurred.
-const DELTA_BEND: f32 = 1e-4;
-/// Reflectance of the clearcoat, index 1.5, at normal incidence.
-const COAT_F0: f32 = 0.04;
 /// A mirrored or refracted direction that rounding put on the wrong side of the surface is lifted to this height.
 const GRAZING_LIFT: f32 = 1e-4;
-
-/// Albedos up to this count as none: their reciprocal would overflow.
-const NO_ALBEDO: f32 = 1e-30;
 const LARGEST_BELOW_1: f32 = 0.999_999_94;
 const INV_PI: f32 = std::f32::consts::FRAC_1_PI;
 
@@ -83,180 +75,6 @@ const SAMPLE_NOTHING: BsdfSample = BsdfSample {
     transmitted: false,
     valid: false,
 };
-
-/// Share of light that an interface facet reflects and lets through.
-#[derive(Clone, Copy, Debug)]
-struct Interface {
-    reflected: Vec3,
-    transmitted: Vec3,
-    /// max(reflected) / (max(reflected) + max(transmitted)): the probability of reflection.
-    reflect_probability: f32,
-    /// 1 - reflect_probability, without cancellation.
-    transmit_probability: f32,
-    /// max(reflected) + max(transmitted).
-    total: f32,
-}
-
-/// What lobe selection needs: approximate albedos, and the probabilities that follow from them.
-#[derive(Clone, Copy, Debug)]
-struct Lobes {
-    /// Share that the coat reflects.
-    coat: f32,
-    /// The interface as it is at the shading normal.
-    interface: Interface,
-    /// What selection takes for the albedo of the interface.
-    interface_albedo: f32,
-    /// Sum of the approximate albedos.
-    sum: f32,
-    p_diffuse: f32,
-    p_interface: f32,
-    p_coat: f32,
-}
-
-fn max3(v: Vec3) -> f32 {
-    v.x.max(v.y).max(v.z)
-}
-
-fn scatters_nothing(s: &Surface) -> bool {
-    s.flags & (MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT) != 0
-}
-
-fn thin_walled(s: &Surface) -> bool {
-    s.flags & MATERIAL_THIN_WALLED != 0
-}
-
-fn surface_index(s: &Surface) -> RelativeIndex {
-    relative_index(s.ior, s.front || thin_walled(s))
-}
-
-fn reflects_delta(s: &Surface) -> bool {
-    s.ggx_alpha < DELTA_ALPHA
-}
-
-fn transmits_delta(s: &Surface) -> bool {
-    reflects_delta(s) || (!thin_walled(s) && s.ggx_alpha * (s.ior - 1.0).abs() < DELTA_BEND)
-}
-
-fn coat_delta(s: &Surface) -> bool {
-    s.coat_alpha < DELTA_ALPHA
-}
-
-fn cos_to(normal: Vec3, wo: Vec3) -> f32 {
-    normal.dot(wo).clamp(MIN_COS, 1.0)
-}
-
-/// Reflectance of the dielectric at normal incidence, per channel.
-fn dielectric_f0(s: &Surface) -> Vec3 {
-    (s.specular_color * normal_reflectance(s.ior)).min(Vec3::ONE)
-}
-
-/// Schlick reflectance of the opaque dielectric (KHR_materials_specular).
-fn opaque_fresnel(s: &Surface, cos: f32) -> Vec3 {
-    schlick(dielectric_f0(s), cos) * s.specular
-}
-
-/// Reflectance of the transmitting dielectric: the exact one, rescaled where KHR_materials_specular changes its ends.
-fn transmitting_fresnel(s: &Surface, cos: f32) -> Vec3 {
-    let exact = fresnel_dielectric(cos, surface_index(s));
-    if exact.total {
-        return Vec3::ONE;
-    }
-    let f0 = normal_reflectance(s.ior);
-    let rise = ((exact.reflectance - f0) / (1.0 - f0).max(1e-6)).clamp(-1.0, 1.0);
-    let low = dielectric_f0(s);
-    let f = ((low + (Vec3::ONE - low) * rise) * s.specular).clamp(Vec3::ZERO, Vec3::ONE);
-    if thin_walled(s) {
-        f * 2.0 / (Vec3::ONE + f)
-    } else {
-        f
-    }
-}
-
-fn interface_at(s: &Surface, cos: f32) -> Interface {
-    let dielectric = 1.0 - s.metallic;
-    let mut reflected = schlick(s.base_color, cos) * s.metallic
-        + opaque_fresnel(s, cos) * (dielectric * (1.0 - s.transmission));
-    let mut transmitted = Vec3::ZERO;
-    if s.transmission > 0.0 {
-        let share = dielectric * s.transmission;
-        let f = transmitting_fresnel(s, cos);
-        reflected += f * share;
-        transmitted = s.base_color * (share * (1.0 - max3(f)));
-    }
-    let total = max3(reflected) + max3(transmitted);
-    let inv = if total > NO_ALBEDO { 1.0 / total } else { 0.0 };
-    Interface {
-        reflected,
-        transmitted,
-        reflect_probability: max3(reflected) * inv,
-        transmit_probability: max3(transmitted) * inv,
-        total,
-    }
-}
-
-/// What the interface reflects at grazing incidence.
-fn grazing_albedo(s: &Surface) -> f32 {
-    let dielectric = 1.0 - s.metallic;
-    s.metallic + dielectric * (s.specular * (1.0 - s.transmission) + s.transmission)
-}
-
-/// Albedo of the diffuse lobe but for the interface above it.
-fn diffuse_color(s: &Surface) -> Vec3 {
-    s.base_color * ((1.0 - s.metallic) * (1.0 - s.transmission))
-}
-
-/// Approximate albedo of the diffuse lobe: the Fresnel factor is taken at the half vector towards the normal, as if that were where
-/// light comes from, so that it stays in proportion at grazing angles.
-fn diffuse_albedo(s: &Surface, cos: f32) -> Vec3 {
-    let f = opaque_fresnel(s, (0.5 + 0.5 * cos).sqrt());
-    diffuse_color(s) * (1.0 - max3(f))
-}
-
-fn coat_share(s: &Surface, wo: Vec3) -> f32 {
-    if s.clearcoat > 0.0 {
-        s.clearcoat * schlick(Vec3::splat(COAT_F0), cos_to(s.coat_ns, wo)).x
-    } else {
-        0.0
-    }
-}
-
-fn lobes_at(s: &Surface, wo: Vec3) -> Lobes {
-    let cos = cos_to(s.ns, wo);
-    let coat = coat_share(s, wo);
-    let interface = interface_at(s, cos);
-    let under = 1.0 - coat;
-    let diffuse = under * max3(diffuse_albedo(s, cos));
-    // Facets seen at grazing angles reflect far more than the normal's: with this floor they stay bounded in weight.
-    let interface_albedo = if reflects_delta(s) {
-        interface.total
-    } else {
-        interface.total + (0.01 + 0.05 * s.ggx_alpha) * grazing_albedo(s)
-    };
-    let specular = under * interface_albedo;
-    let sum = coat + diffuse + specular;
-    let inv = if sum > NO_ALBEDO { 1.0 / sum } else { 0.0 };
-    Lobes {
-        coat,
-        interface,
-        interface_albedo,
-        sum,
-        p_diffuse: diffuse * inv,
-        p_interface: specular * inv,
-        p_coat: coat * inv,
-    }
-}
-
-/// Cosine of Lambert's law for a shading normal that differs from the geometric one: directions of the shading hemisphere that lie
-/// under the surface are mirrored up at it, so that no energy is lost and a white Lambertian mesh reflects all light.
-fn lambert_cos(s: &Surface, wi: Vec3) -> f32 {
-    let height = s.ng.dot(wi);
-    if height <= 0.0 {
-        return 0.0;
-    }
-    let direct = s.ns.dot(wi);
-    let mirrored = direct - 2.0 * height * s.ng.dot(s.ns);
-    direct.max(0.0) + mirrored.max(0.0)
-}
 
 /// Scattering from `wi` to `wo` (unit, both pointing away from the surface, `wo` on the side of `ng`) by the non-delta lobes.
 pub fn bsdf_eval(s: &Surface, wo: Vec3, wi: Vec3) -> BsdfEval {

@@ -6,6 +6,7 @@
 mod bsdf;
 mod fresnel;
 mod ggx;
+mod lobes;
 mod normal;
 mod surface;
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3, Vec4};
 
 use crate::accel::Hit;
+use crate::camera::lens::camera_project;
 use crate::packed::{
     MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
     MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, Material, NONE,
@@ -148,35 +149,19 @@ pub fn triangle_emission(scene: &PackedScene, triangle: u32, u: f32, v: f32) -> 
     emission * surface_alpha(scene, hit)
 }
 
-/// Albedo that the photograph's pixel over `position` was found to have: the median where the camera does not see the point.
-fn photo_albedo_at(scene: &PackedScene, position: Vec3) -> Vec3 {
+/// Albedo that the photograph's pixel over `position` was found to have: the object's median where the camera does not see the point.
+fn photo_albedo_at(scene: &PackedScene, position: Vec3, object: u32) -> Vec3 {
     let frame = &scene.frame;
-    let median = Vec4::from(frame.photo_albedo_median).truncate();
-    let offset = position - Vec4::from(frame.camera_position).truncate();
-    let depth = -offset.dot(Vec4::from(frame.camera_back).truncate());
-    if depth <= 0.0 {
-        return median;
+    let seen = camera_project(frame, position);
+    if seen.valid {
+        let pixel = seen.py as u32 * frame.width + seen.px as u32;
+        let [r, g, b, depth] = scene.photo_albedo[pixel as usize];
+        if depth > 0.0 && (depth - seen.depth).abs() <= PHOTO_DEPTH_TOLERANCE * seen.depth {
+            return Vec3::new(r, g, b);
+        }
     }
-    // OpenCV axes: y down. The lens distortion maps ideal to photograph coordinates.
-    let x = offset.dot(Vec4::from(frame.camera_right).truncate()) / depth;
-    let y = -offset.dot(Vec4::from(frame.camera_up).truncate()) / depth;
-    let [k1, k2, p1, p2] = frame.distortion;
-    let r2 = x * x + y * y;
-    let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * frame.distortion_k3));
-    let xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
-    let yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
-    let [fx, fy, cx, cy] = frame.intrinsics;
-    let px = (fx * xd + cx).floor();
-    let py = (fy * yd + cy).floor();
-    if !(px >= 0.0 && py >= 0.0 && px < frame.width as f32 && py < frame.height as f32) {
-        return median;
-    }
-    let [r, g, b, seen_depth] = scene.photo_albedo[(py as u32 * frame.width + px as u32) as usize];
-    if seen_depth > 0.0 && (seen_depth - depth).abs() <= PHOTO_DEPTH_TOLERANCE * depth {
-        Vec3::new(r, g, b)
-    } else {
-        median
-    }
+    let [r, g, b, _] = scene.photo_albedo[(frame.width * frame.height + object) as usize];
+    Vec3::new(r, g, b)
 }
 
 /// `normal` as the normal map of slot `map` perturbs it; unchanged without a map.
@@ -303,7 +288,7 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
     let coverage = coverage_of(material, base.w);
     let mut surface_flags = flags;
     if flags & MATERIAL_PHOTO_ALBEDO != 0 {
-        base_color = photo_albedo_at(scene, position);
+        base_color = photo_albedo_at(scene, position, triangle.object);
         surface_flags |= MATERIAL_LAMBERTIAN;
     }
     if flags & MATERIAL_UNLIT != 0 {

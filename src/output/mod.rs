@@ -12,8 +12,8 @@ pub use exr_file::{Metadata, write_exr};
 pub use film_file::{FilmNote, read_film, write_film};
 pub use png_file::{PngBits, write_png};
 pub use reference_file::write_reference;
-pub(crate) use target::check_writable;
 pub use target::{Format, Target, write_bytes, write_text};
+pub(crate) use target::{check_distinct, check_writable};
 
 use std::path::PathBuf;
 
@@ -24,6 +24,10 @@ pub enum OutputError {
     Extension { path: PathBuf },
     #[error("{}: is a folder or another special file, not a picture", path.display())]
     NotAFile { path: PathBuf },
+    #[error("{}: the scene is made of this file; give the output another name", path.display())]
+    Input { path: PathBuf },
+    #[error("{}: named for two outputs; give each a name of its own", path.display())]
+    Twice { path: PathBuf },
     #[error("{}: cannot be written: {source}", path.display())]
     Io {
         path: PathBuf,

@@ -54,6 +54,35 @@ pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
     temporary_beside(path).map(|_| ())
 }
 
+/// Fails if an output would replace one of `inputs` or another output.
+pub(crate) fn check_distinct(outputs: &[&Path], inputs: &[PathBuf]) -> Result<(), OutputError> {
+    let inputs: Vec<PathBuf> = inputs.iter().map(|path| resolved(path)).collect();
+    let mut seen = Vec::new();
+    for path in outputs {
+        let resolved = resolved(path);
+        if inputs.contains(&resolved) {
+            return Err(OutputError::Input { path: path.into() });
+        }
+        if seen.contains(&resolved) {
+            return Err(OutputError::Twice { path: path.into() });
+        }
+        seen.push(resolved);
+    }
+    Ok(())
+}
+
+/// One path for each file however it is named, for files that do not exist yet too.
+fn resolved(path: &Path) -> PathBuf {
+    let of_folder = || {
+        let absolute = std::path::absolute(path).ok()?;
+        let folder = absolute.parent()?.canonicalize().ok()?;
+        Some(folder.join(absolute.file_name()?))
+    };
+    (path.canonicalize().ok())
+        .or_else(of_folder)
+        .unwrap_or_else(|| path.into())
+}
+
 /// Replaces the file at `path` by `text`.
 ///
 /// # Errors

@@ -55,7 +55,6 @@ impl PackedScene {
             real_vertex_count: 0,
             env_mean_luminance: 0.0,
         };
-        packed.frame.photo_albedo_median = [0.5, 0.5, 0.5, 0.0];
         packed.set_camera(scene);
         packed.set_settings(scene);
         packed.set_environment(scene);

@@ -66,7 +66,8 @@ impl MaterialTable {
         };
         let mut record = Material {
             base_color: m.base_color,
-            emissive: m.emissive,
+            // Unlit surfaces show their base colour alone, and as lights would be sampled for what they do not show.
+            emissive: if m.unlit { [0.0; 3] } else { m.emissive },
             normal_scale: m.normal_scale,
             metallic: m.metallic,
             roughness: m.roughness,

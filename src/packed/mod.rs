@@ -46,7 +46,8 @@ pub struct PackedScene {
     pub env_texels: Vec<f32>,
     /// Cumulative distributions of the environment's cells (see `light::environment::EnvironmentTable`).
     pub env_cdf: Vec<f32>,
-    /// Albedo of the photograph's pixels for `albedo = "from-photo"`: rgb and the depth (metres along the axis) it was seen at; empty where unused.
+    /// For `albedo = "from-photo"`, empty where unused: albedo of the photograph's pixels and the depth (metres along the axis) it was seen
+    /// at, then for each scene object the median that its points take which the camera does not see.
     pub photo_albedo: Vec<[f32; 4]>,
     /// One word a pixel: what the pilot found (see [`PixelInfo`]).
     pub pixels: Vec<PixelInfo>,

@@ -63,8 +63,6 @@ pub struct Frame {
     pub pad_0: f32,
     pub pad_1: f32,
     pub pad_2: f32,
-    /// Median albedo for photo-albedo points that the camera does not see, w unused.
-    pub photo_albedo_median: [f32; 4],
     /// Bounding spheres of the virtual geometry: centre, radius.
     pub spheres: [[f32; 4]; MAX_SPHERES],
 }

@@ -43,6 +43,7 @@ pub fn test_scene() -> Scene {
             backend: BackendChoice::Cpu,
             exposure: Exposure::Ev(0.0),
         },
+        inputs: Vec::new(),
         warnings: Vec::new(),
     }
 }

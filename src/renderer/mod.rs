@@ -91,6 +91,8 @@ pub struct Renderer {
 }
 
 enum Backend {
+    /// The choice is automatic and there has been nothing to trace, so no device was opened.
+    Undecided,
     Cpu,
     Gpu(Box<GpuBackend>),
 }
@@ -119,7 +121,7 @@ impl Renderer {
             packed,
             film,
             end_sample,
-            backend: Backend::Cpu,
+            backend: Backend::Undecided,
             options,
             rays: RayTotals::default(),
             seconds: Seconds::default(),
@@ -152,6 +154,7 @@ impl Renderer {
         let choice = match self.scene.settings.backend {
             BackendChoice::Cpu => return Ok(Backend::Cpu),
             BackendChoice::Gpu => AdapterChoice::Any,
+            BackendChoice::Auto if self.nothing_to_trace() => return Ok(Backend::Undecided),
             BackendChoice::Auto => AdapterChoice::Hardware,
         };
         let specialised = !self.options.without.contains(Skip::Specialisation);
@@ -397,6 +400,11 @@ impl Renderer {
             gpu.set_scene(&self.packed)?;
         }
         self.seconds.build += start.elapsed().as_secs_f64();
+        if matches!(self.backend, Backend::Undecided) {
+            let start = Instant::now();
+            self.backend = self.open_backend()?;
+            self.seconds.compile += start.elapsed().as_secs_f64();
+        }
         Ok(())
     }
 
@@ -479,7 +487,7 @@ impl Renderer {
     /// "cpu" or "gpu".
     pub fn backend_name(&self) -> &'static str {
         match self.backend {
-            Backend::Cpu => "cpu",
+            Backend::Undecided | Backend::Cpu => "cpu",
             Backend::Gpu(_) => "gpu",
         }
     }
@@ -487,8 +495,37 @@ impl Renderer {
     /// The adapter's name, or the number of threads.
     pub fn device_name(&self) -> String {
         match &self.backend {
-            Backend::Cpu => format!("{} CPU threads", rayon::current_num_threads()),
+            Backend::Undecided | Backend::Cpu => {
+                format!("{} CPU threads", rayon::current_num_threads())
+            }
             Backend::Gpu(gpu) => gpu.device_name(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packed::test_scene;
+
+    #[test]
+    fn no_device_is_opened_until_there_is_something_to_trace() {
+        let mut scene = test_scene();
+        scene.settings.backend = BackendChoice::Auto;
+        let mut renderer = Renderer::new(scene, RendererOptions::default()).expect("fits");
+        assert!(matches!(renderer.backend, Backend::Undecided));
+        (renderer.advance(Budget::Complete, &|| false, &mut |_| ())).expect("nothing to do");
+        assert_eq!(renderer.rays(), RayTotals::default());
+        let lamp = Light {
+            kind: LightKind::Quad {
+                corner: [-1.0, -1.0, -2.0],
+                edge_u: [2.0, 0.0, 0.0],
+                edge_v: [0.0, 2.0, 0.0],
+                radiance: [1.0; 3],
+            },
+            side: Side::Virtual,
+        };
+        renderer.set_lights(vec![lamp]).expect("fits");
+        assert!(!matches!(renderer.backend, Backend::Undecided));
     }
 }

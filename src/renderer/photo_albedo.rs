@@ -33,16 +33,14 @@ struct Seen {
     /// Metres along the view axis; 0: nothing, or nothing whose albedo is wanted.
     depth_m: f32,
     normal: Vec3,
+    object: u32,
 }
 
-/// Fills `scene.photo_albedo` and its median so that the converged Ir reproduces the photograph.
+/// Fills `scene.photo_albedo` so that the converged Ir reproduces the photograph.
 pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo) {
     let seen = first_surfaces(scene, |flags| flags & MATERIAL_PHOTO_ALBEDO != 0);
-    scene.photo_albedo = seen
-        .iter()
-        .map(|s| [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, s.depth_m])
-        .collect();
-    scene.frame.photo_albedo_median = [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, 0.0];
+    scene.photo_albedo = unknown_albedo(scene, &seen);
+    let pixels = seen.len();
     let scale = scene.frame.exposure_scale;
     for _ in 0..ROUNDS {
         let light = light_on_surfaces(scene, &seen);
@@ -58,16 +56,15 @@ pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo) {
                 }
             }
         }
-        scene.frame.photo_albedo_median = median(&scene.photo_albedo);
+        let (of_pixels, of_objects) = scene.photo_albedo.split_at_mut(pixels);
+        set_medians(of_pixels, &seen, of_objects);
     }
 }
 
 /// log2 of the factor that fits the real radiance to the photograph over the proxy: the median of Ic / Ir in luminance.
 pub fn fit_exposure_ev(scene: &mut PackedScene, photo: &Photo) -> Option<f64> {
     let seen = first_surfaces(scene, |_| true);
-    // Nothing is known of the albedo yet: every point takes the median.
-    scene.photo_albedo = vec![[0.0; 4]; seen.len()];
-    scene.frame.photo_albedo_median = [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, 0.0];
+    scene.photo_albedo = unknown_albedo(scene, &seen);
     let grid = trace_grid(scene, &seen);
     let width = scene.frame.width as usize;
     let mut ratios: Vec<f64> = grid
@@ -113,11 +110,13 @@ fn first_surfaces(scene: &PackedScene, wanted: impl Fn(u32) -> bool + Sync) -> V
                 return Seen {
                     depth_m: 0.0,
                     normal: Vec3::ZERO,
+                    object: NONE,
                 };
             }
             Seen {
                 depth_m: hit.t * -ray.direction.dot(back),
                 normal: interpolated_normal(scene, hit),
+                object: scene.triangles[hit.triangle as usize].object,
             }
         })
         .collect()
@@ -240,19 +239,123 @@ fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen]) -> Vec<Vec3> {
         .collect()
 }
 
-/// Channel by channel over the pixels that have an albedo.
-fn median(entries: &[[f32; 4]]) -> [f32; 4] {
-    let mut result = [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, 0.0];
-    for (c, result) in result.iter_mut().enumerate().take(3) {
-        let mut values: Vec<f32> = entries
-            .iter()
-            .filter(|e| e[3] > 0.0)
-            .map(|e| e[c])
-            .collect();
-        if !values.is_empty() {
-            let middle = values.len() / 2;
-            *result = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
+/// [`FIRST_ALBEDO`] for every pixel and every object.
+fn unknown_albedo(scene: &PackedScene, seen: &[Seen]) -> Vec<[f32; 4]> {
+    let first = |depth_m: f32| [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, depth_m];
+    let objects = (scene.triangles.iter())
+        .filter(|t| t.object != NONE)
+        .map(|t| t.object + 1)
+        .max()
+        .unwrap_or(0);
+    let of_pixels = seen.iter().map(|s| first(s.depth_m));
+    of_pixels.chain((0..objects).map(|_| first(0.0))).collect()
+}
+
+/// Each object's median over the pixels that see it; one that no pixel sees takes that of all.
+fn set_medians(of_pixels: &[[f32; 4]], seen: &[Seen], of_objects: &mut [[f32; 4]]) {
+    let mut all = Vec::new();
+    let mut by_object = vec![Vec::new(); of_objects.len()];
+    for (albedo, s) in of_pixels.iter().zip(seen) {
+        if s.depth_m > 0.0 {
+            all.push(*albedo);
+            by_object[s.object as usize].push(*albedo);
         }
     }
-    result
+    let of_all = median(&mut all);
+    for (entry, albedos) in of_objects.iter_mut().zip(&mut by_object) {
+        if let Some(median) = median(albedos).or(of_all) {
+            *entry = median;
+        }
+    }
+}
+
+/// Channel by channel.
+fn median(albedos: &mut [[f32; 4]]) -> Option<[f32; 4]> {
+    if albedos.is_empty() {
+        return None;
+    }
+    let middle = albedos.len() / 2;
+    Some(std::array::from_fn(|c| {
+        let by_channel = |a: &[f32; 4], b: &[f32; 4]| a[c].total_cmp(&b[c]);
+        albedos.select_nth_unstable_by(middle, by_channel).1[c]
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packed::{test_mesh, test_scene};
+    use crate::scene::{EncodedPhoto, Environment, EnvironmentMap, Material, Object, Scene, Side};
+
+    /// A square that faces the camera from 1 m, with corners at x = `from` and x = `to`.
+    fn wall(from: f32, to: f32) -> Object {
+        let corners = [
+            [from, -0.5, -1.0],
+            [to, -0.5, -1.0],
+            [to, 0.5, -1.0],
+            [from, 0.5, -1.0],
+        ];
+        let mut wall = test_mesh(
+            Side::Real,
+            &corners,
+            &[[0, 1, 2], [0, 2, 3]],
+            Material::default(),
+        );
+        wall.albedo_from_photo = true;
+        wall
+    }
+
+    /// In a white furnace without bounces a surface shows its albedo. Two walls share the view, one a quarter and one three quarters of it,
+    /// and reach beyond it; a third is behind the camera.
+    fn scene() -> (Scene, Photo) {
+        let mut scene = test_scene();
+        let camera = &mut scene.camera;
+        (camera.width, camera.height) = (32, 32);
+        (camera.fx, camera.fy, camera.cx, camera.cy) = (32.0, 32.0, 16.0, 16.0);
+        scene.settings.max_bounces = 1;
+        scene.environment = Some(Environment {
+            map: EnvironmentMap::Constant([1.0; 3]),
+            rotation_deg: 0.0,
+            scale: 1.0,
+        });
+        let mut behind = wall(-0.5, 0.5);
+        behind.world_from_object = glam::DMat4::from_translation(glam::DVec3::Z * 5.0);
+        scene.objects = vec![wall(-2.0, -0.25), wall(-0.25, 2.0), behind];
+        let linear = (0..32 * 32)
+            .map(|i| {
+                if i % 32 < 8 {
+                    [0.8, 0.2, 0.1]
+                } else {
+                    [0.1, 0.2, 0.6]
+                }
+            })
+            .collect();
+        let photo = Photo {
+            width: 32,
+            height: 32,
+            linear,
+            encoded: EncodedPhoto::Linear,
+        };
+        (scene, photo)
+    }
+
+    fn close(found: &[f32; 4], expected: [f32; 3]) -> bool {
+        (0..3).all(|c| (found[c] - expected[c]).abs() < 0.01)
+    }
+
+    #[test]
+    fn each_object_has_the_median_of_its_own_pixels() {
+        let (scene, photo) = scene();
+        let mut packed = PackedScene::build(&scene).expect("packs");
+        estimate_photo_albedo(&mut packed, &photo);
+        let of_objects = &packed.photo_albedo[32 * 32..];
+        let (red, blue) = ([0.8, 0.2, 0.1], [0.1, 0.2, 0.6]);
+        assert_eq!(of_objects.len(), 3);
+        assert!(close(&of_objects[0], red), "{of_objects:?}");
+        assert!(close(&of_objects[1], blue), "{of_objects:?}");
+        // Seen by no pixel: what most of the picture shows.
+        assert!(close(&of_objects[2], blue), "{of_objects:?}");
+        // Negative control.
+        assert!(!close(&of_objects[0], blue));
+    }
 }

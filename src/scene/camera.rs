@@ -1,6 +1,6 @@
 //! `[camera]` and `[lens]`.
 
-use crate::camera::lens::undistort;
+use crate::camera::lens::check_distortion;
 
 use super::error::Result;
 use super::image_file::{MAX_PIXELS, MAX_SIDE_PX};
@@ -63,34 +63,16 @@ pub(super) fn read_camera(root: &Table, photo: Option<&Photo>) -> Result<Camera>
             .unwrap_or_default(),
         world_from_camera: read_camera_pose(&table)?,
     };
-    table.optional("distortion", |node| check_distortion(node, &camera))?;
-    Ok(camera)
-}
-
-/// Every ray starts by inverting the distortion. The inversion walks from the centre outward, so the border is the hardest part;
-/// the grid is for a centre outside the picture.
-fn check_distortion(node: &Node, camera: &Camera) -> Result<()> {
-    const GRID: u32 = 32;
-    let (width, height) = (camera.width, camera.height);
-    let across = (0..=width).flat_map(|x| [(x, 0), (x, height)]);
-    let down = (0..=height).flat_map(|y| [(0, y), (width, y)]);
-    let border = across
-        .chain(down)
-        .map(|(x, y)| (f64::from(x), f64::from(y)));
-    let fraction = |i: u32, side: u32| f64::from(side) * f64::from(i) / f64::from(GRID);
-    let grid = (1..GRID)
-        .flat_map(|j| (1..GRID).map(move |i| (i, j)))
-        .map(|(i, j)| (fraction(i, width), fraction(j, height)));
-    for (x, y) in border.chain(grid) {
-        undistort(camera, x, y).map_err(|problem| {
+    table.optional("distortion", |node| {
+        check_distortion(&camera).map_err(|problem| {
             node.error(
                 problem,
                 "coefficients (OpenCV's k1 k2 p1 p2 k3) that reach every pixel",
                 "correct them or `fx` and `fy`",
             )
-        })?;
-    }
-    Ok(())
+        })
+    })?;
+    Ok(camera)
 }
 
 fn read_side(table: &Table, key: &str, photo_side: Option<u32>) -> Result<u32> {

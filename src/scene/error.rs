@@ -1,5 +1,6 @@
 //! The one error of scene loading: where, what, what was expected, how to mend it, on one line.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 /// Why a scene was refused. Displays as one line.
@@ -29,6 +30,8 @@ pub(super) type Result<T> = std::result::Result<T, SceneError>;
 pub(super) struct Source {
     pub path: PathBuf,
     pub text: String,
+    /// Files that were named and found.
+    pub files: RefCell<Vec<PathBuf>>,
 }
 
 impl Source {
@@ -40,17 +43,22 @@ impl Source {
                     Some(rest) => rest.to_owned(),
                     None => text,
                 };
-                Ok(Self { path, text })
+                Ok(Self::of(path, text))
             }
             Err(error) => {
                 let end = error.utf8_error().valid_up_to();
                 let valid = String::from_utf8_lossy(&error.as_bytes()[..end]).into_owned();
-                Err(Self { path, text: valid }.error(
+                Err(Self::of(path, valid).error(
                     end,
                     "a byte here is not UTF-8; expected a text file; save the scene file as UTF-8",
                 ))
             }
         }
+    }
+
+    fn of(path: PathBuf, text: String) -> Self {
+        let files = RefCell::new(vec![path.clone()]);
+        Self { path, text, files }
     }
 
     /// An error at a byte offset.

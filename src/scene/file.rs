@@ -76,8 +76,10 @@ pub(super) fn read_scene(source: &Source) -> Result<Scene> {
     let environment = read_environment(&root, &mut warnings)?;
     let mut lights = read_lights(&root)?;
     let reader = ObjectReader::new(photo.is_some(), &mut warnings);
-    let (objects, mesh_lights) = reader.read_all(&root)?;
+    let (objects, mesh_lights, mesh_files) = reader.read_all(&root)?;
     lights.extend(mesh_lights);
+    let mut inputs = source.files.borrow().clone();
+    inputs.extend(mesh_files);
     Ok(Scene {
         name: scene_name(&source.path),
         path: source.path.clone(),
@@ -88,6 +90,7 @@ pub(super) fn read_scene(source: &Source) -> Result<Scene> {
         lights,
         objects,
         settings,
+        inputs,
         warnings,
     })
 }

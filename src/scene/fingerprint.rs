@@ -24,6 +24,7 @@ impl Scene {
         let Self {
             name: _,
             path: _,
+            inputs: _,
             photo,
             camera,
             lens,

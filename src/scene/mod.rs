@@ -54,6 +54,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     pub objects: Vec<Object>,
     pub settings: Settings,
+    /// The files that the scene is made of, its own included.
+    pub inputs: Vec<PathBuf>,
     /// Things worth telling the user that are not errors (dropped triangles, ignored gamma chunks).
     pub warnings: Vec<String>,
 }
@@ -222,7 +224,6 @@ pub struct Material {
     pub emissive: [f32; 3],
     pub emissive_texture: Option<TextureRef>,
     pub alpha_mode: AlphaMode,
-    pub double_sided: bool,
     /// Emits its base colour and scatters nothing.
     pub unlit: bool,
     pub ior: f32,
@@ -265,7 +266,6 @@ impl Default for Material {
             emissive: [0.0; 3],
             emissive_texture: None,
             alpha_mode: AlphaMode::Opaque,
-            double_sided: true,
             unlit: false,
             ior: 1.5,
             specular: 1.0,

@@ -11,7 +11,7 @@ use super::error::{Result, SceneError};
 use super::gltf::{GltfScene, PlacedLight, Problem, PunctualLight, load_gltf};
 use super::material::{lambertian, read_material};
 use super::pose::read_transform;
-use super::reader::{Choice, MAX_MAGNITUDE, Node, Table};
+use super::reader::{Choice, Node, Table};
 use super::scan::settle_scan;
 use super::shape::Shape;
 use super::{AlphaMode, Instance, Light, LightKind, Material, Object, Side};
@@ -31,6 +31,9 @@ const REAL_KEYS: &[&str] = &["albedo", "smooth_radius_m", "self_shadow_bias_m"];
 
 /// Albedo of a proxy of which nothing is known.
 const UNKNOWN_ALBEDO: f32 = 0.5;
+
+/// Farther from the origin nothing stands: well within what the acceleration structures take.
+const MAX_DISTANCE_M: f64 = 1e12;
 
 /// Reads the objects of one scene file.
 pub(super) struct ObjectReader<'w> {
@@ -60,15 +63,16 @@ impl<'w> ObjectReader<'w> {
         }
     }
 
-    /// All of `[[real]]`, then all of `[[virtual]]`, and the lights that came with them.
-    pub fn read_all(mut self, root: &Table) -> Result<(Vec<Object>, Vec<Light>)> {
+    /// All of `[[real]]`, then all of `[[virtual]]`, the lights that came with them, and the files that their meshes name.
+    pub fn read_all(mut self, root: &Table) -> Result<(Vec<Object>, Vec<Light>, Vec<PathBuf>)> {
         let mut objects = Vec::new();
         for (key, side) in [("real", Side::Real), ("virtual", Side::Virtual)] {
             for node in root.list(key)? {
                 objects.push(self.read(&node, side)?);
             }
         }
-        Ok((objects, self.lights))
+        let files = self.meshes.values().flat_map(|mesh| mesh.files.clone());
+        Ok((objects, self.lights, files.collect()))
     }
 
     fn read(&mut self, node: &Node, side: Side) -> Result<Object> {
@@ -279,13 +283,13 @@ fn check_extent(table: &Table, object: &Object) -> Result<()> {
 
 /// False for NaN too.
 fn is_near(world: DVec3) -> bool {
-    world.to_array().iter().all(|x| x.abs() <= MAX_MAGNITUDE)
+    world.to_array().iter().all(|x| x.abs() <= MAX_DISTANCE_M)
 }
 
 fn too_far(table: &Table, what: &str) -> SceneError {
     table.error(
-        format!("`{what}` is more than 1e15 m from the origin"),
-        "coordinates of at most 1e15 m",
+        format!("`{what}` is more than 1e12 m from the origin"),
+        "coordinates of at most 1e12 m",
         "lower `scale` or `translation`",
     )
 }

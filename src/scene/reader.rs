@@ -242,6 +242,7 @@ impl<'a> Node<'a> {
     pub fn existing_file(&self) -> Result<PathBuf> {
         let path = self.source.resolve(self.string()?);
         if path.is_file() {
+            self.source.files.borrow_mut().push(path.clone());
             return Ok(path);
         }
         Err(self.error(

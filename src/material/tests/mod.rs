@@ -1,5 +1,8 @@
 mod bsdf;
+mod density;
+mod energy;
 mod fresnel;
+mod kinds;
 mod surface;
 mod texture;
 mod twins;

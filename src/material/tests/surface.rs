@@ -323,12 +323,13 @@ fn photo_albedo_is_read_where_the_camera_sees_the_point() {
         intrinsics: [8.0, 8.0, 4.0, 3.0],
         width,
         height,
-        photo_albedo_median: [0.9, 0.9, 0.9, 0.0],
         ..Frame::zeroed()
     };
     scene.photo_albedo = (0..width * height)
         .map(|i| [i as f32 / 100.0, 0.5, 0.5, 2.02])
+        .chain([[0.8; 4], [0.9; 4]])
         .collect();
+    scene.triangles[0].object = 1;
     let point = hit(0.5, 0.25);
     // x = 4 + 8 * 0.25 = 6, y = 3 - 8 * 0.125 = 2.
     let at =
@@ -340,12 +341,16 @@ fn photo_albedo_is_read_where_the_camera_sees_the_point() {
     scene.frame.distortion = [10.0, 0.0, 0.0, 0.0];
     assert_eq!(at(&scene).base_color.x, (width + 7) as f32 / 100.0);
     scene.frame.distortion = [0.0; 4];
-    // Negative controls: something else is in front, no data, out of the picture, behind the camera.
+    // Negative controls: something else is in front, no data, out of the picture, behind the camera. Another object has another median.
+    let pixels = (width * height) as usize;
     for depth in [1.9, 2.1, 0.0, -1.0] {
-        scene.photo_albedo.iter_mut().for_each(|p| p[3] = depth);
+        (scene.photo_albedo[..pixels].iter_mut()).for_each(|p| p[3] = depth);
         assert_eq!(at(&scene).base_color.x, 0.9);
     }
-    scene.photo_albedo.iter_mut().for_each(|p| p[3] = 2.0);
+    scene.triangles[0].object = 0;
+    assert_eq!(at(&scene).base_color.x, 0.8);
+    scene.triangles[0].object = 1;
+    (scene.photo_albedo[..pixels].iter_mut()).for_each(|p| p[3] = 2.0);
     scene.frame.intrinsics = [80.0, 80.0, 4.0, 3.0];
     assert_eq!(at(&scene).base_color.x, 0.9);
     scene.frame.camera_back = [0.0, 0.0, -1.0, 0.0];
@@ -442,10 +447,9 @@ pub fn gallery(random: &mut Random) -> PackedScene {
         distortion_k3: 0.01,
         width,
         height,
-        photo_albedo_median: [0.9, 0.8, 0.7, 0.0],
         ..Frame::zeroed()
     };
-    scene.photo_albedo = (0..width * height)
+    scene.photo_albedo = (0..width * height + 5)
         .map(|_| {
             [
                 random.uniform(),

@@ -338,8 +338,13 @@ fn shading_points_agree_with_their_twin() {
     let differ = outliers(&expected(&scene), &got, 2e-5, 2e-5);
     eprintln!("{differ} of {} differ", inputs.len());
     assert!(differ <= 20, "{differ} of {}", inputs.len());
-    // Negative control: another normal map strength.
+    // Negative controls: other medians of the photograph's albedo, another normal map strength.
     let mut other = scene;
+    let pixels = (other.frame.width * other.frame.height) as usize;
+    other.photo_albedo[pixels..].rotate_left(1);
+    let differ = outliers(&expected(&other), &got, 2e-5, 2e-5);
+    assert!(differ > 500, "{differ}");
+    other.photo_albedo[pixels..].rotate_right(1);
     for material in &mut other.materials {
         material.normal_scale *= 1.01;
     }
@@ -378,7 +383,7 @@ import package::trace::Hit;
         ("clearcoat", &["bsdf_sample_coat"]),
         (
             "rough_specular",
-            &["bsdf_lobes_at", "ggx_ggx_d", "normal_valid_shading_normal"],
+            &["lobes_lobes_at", "ggx_ggx_d", "normal_valid_shading_normal"],
         ),
         ("photo_albedo", &["surface_photo_albedo_at"]),
         ("alpha", &["surface_coverage_of"]),

@@ -1,7 +1,7 @@
 //! The outer layers of a glTF file: the GLB container, the JSON text, URIs.
 
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -150,6 +150,15 @@ pub(super) fn read_uri(uri: &str, folder: &Path, limit: u64) -> Result<Vec<u8>, 
             Ok(bytes)
         };
     }
+    let path = file_of_uri(uri, folder)?.unwrap_or_default();
+    read_file(&path, limit).map_err(|reason| format!("{}: {reason}", path.display()))
+}
+
+/// The file that a URI names; None for a data URI.
+pub(super) fn file_of_uri(uri: &str, folder: &Path) -> Result<Option<PathBuf>, String> {
+    if strip_scheme(uri, "data:").is_some() {
+        return Ok(None);
+    }
     if let Some((scheme, _)) = uri.split_once(':')
         && scheme.len() > 1
         && scheme
@@ -163,8 +172,7 @@ pub(super) fn read_uri(uri: &str, folder: &Path, limit: u64) -> Result<Vec<u8>, 
     }
     let relative =
         String::from_utf8(percent_decode(uri)?).map_err(|_| "the path is not UTF-8".to_string())?;
-    let path = folder.join(&relative);
-    read_file(&path, limit).map_err(|reason| format!("{}: {reason}", path.display()))
+    Ok(Some(folder.join(&relative)))
 }
 
 fn strip_scheme<'a>(uri: &'a str, scheme: &str) -> Option<&'a str> {

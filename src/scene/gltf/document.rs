@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::Problem;
-use super::container::{Container, clip, malformed, read_uri};
+use super::container::{Container, clip, file_of_uri, malformed, read_uri};
 
 /// Elements of an accessor that no buffer backs (all zero, or sparse over zeros): the only size a file can state without bytes.
 const MAX_UNBACKED_ELEMENTS: u64 = 1 << 24;
@@ -111,6 +111,15 @@ impl Document {
             bin,
             decoded: Cell::new(0),
         })
+    }
+
+    /// The files that buffers and images name, whether or not they exist and are drawn.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let buffers = self.buffers.iter().filter_map(|buffer| buffer.uri.as_ref());
+        let images = self.images.iter().filter_map(|image| image.uri.as_ref());
+        (buffers.chain(images))
+            .filter_map(|uri| file_of_uri(uri, &self.folder).ok().flatten())
+            .collect()
     }
 
     /// Whether an accessor names bytes of its own; compressed meshes leave theirs out.

@@ -106,7 +106,6 @@ impl<'a> Materials<'a> {
             emissive: slots.limited("emissiveFactor", source.emissive_factor.0, f32::MAX)?,
             emissive_texture: slots.texture("emissiveTexture", &source.emissive_texture)?,
             alpha_mode: alpha_mode(source, at)?,
-            double_sided: source.double_sided,
             thin_walled: true,
             ..Material::default()
         };

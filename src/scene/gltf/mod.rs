@@ -12,8 +12,8 @@ mod document;
 mod image;
 mod material;
 mod mesh;
+mod notes;
 
-use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -24,6 +24,7 @@ use gltf::json::validation::Checked;
 use super::Instance;
 use container::malformed;
 use document::{Document, Node};
+use notes::{Note, Notes};
 
 /// What a glTF file brings into an object.
 #[derive(Clone, Debug, Default)]
@@ -33,6 +34,8 @@ pub struct GltfScene {
     pub lights: Vec<PlacedLight>,
     /// At least one drawn primitive names a material of its own; the others have glTF's default (white rough metal).
     pub has_materials: bool,
+    /// The files beside this one that its buffers and images name.
+    pub files: Vec<PathBuf>,
     /// One line each; the caller adds the file's name.
     pub warnings: Vec<String>,
 }
@@ -165,7 +168,10 @@ fn load(path: &Path) -> Result<GltfScene, Problem> {
 
     let mut meshes = mesh::Meshes::new(&document);
     let mut materials = material::Materials::new(&document);
-    let mut scene = GltfScene::default();
+    let mut scene = GltfScene {
+        files: document.files(),
+        ..GltfScene::default()
+    };
     for (index, object_from_node) in placed_nodes(&document, &mut notes)? {
         let node = &document.nodes[index];
         if let Some(placed) = &node.extensions.light {
@@ -416,89 +422,4 @@ fn place_light(
         object_from_light,
         kind,
     })
-}
-
-/// Things worth a warning that may occur a thousand times in one file: each kind becomes one line.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Note {
-    Degenerate,
-    NotTriangles,
-    Incomplete,
-    ZeroNormals,
-    BadTangents,
-    MorphTargets,
-    Skinned,
-    Collapsed,
-    MissingUv,
-    EmptyTexture,
-    Clamped,
-}
-
-#[derive(Default)]
-struct Notes {
-    counted: BTreeMap<Note, (u64, u64, String)>,
-    plain: Vec<String>,
-}
-
-impl Notes {
-    /// `count` occurrences at one more place.
-    fn add(&mut self, note: Note, count: u64, place: &str) {
-        let entry = self
-            .counted
-            .entry(note)
-            .or_insert_with(|| (0, 0, place.to_string()));
-        entry.0 += count;
-        entry.1 += 1;
-    }
-
-    fn plain(&mut self, line: String) {
-        if !self.plain.contains(&line) {
-            self.plain.push(line);
-        }
-    }
-
-    fn lines(self) -> Vec<String> {
-        let counted = self
-            .counted
-            .into_iter()
-            .map(|(note, (count, places, first))| {
-                let place = match places {
-                    1 => first,
-                    _ => format!("{first} and {} more", places - 1),
-                };
-                match note {
-                    Note::Degenerate => format!("dropped {count} degenerate triangles in {place}"),
-                    Note::NotTriangles => {
-                        format!("points and lines are not drawn: left out {place}")
-                    }
-                    Note::Incomplete => {
-                        format!("left out {count} indices that complete no triangle in {place}")
-                    }
-                    Note::ZeroNormals => {
-                        format!("replaced {count} zero normals by the faces' in {place}")
-                    }
-                    Note::BadTangents => {
-                        format!("derived tangents from the texture coordinates instead of unusable ones in {place}")
-                    }
-                    Note::MorphTargets => format!("morph targets are not applied, the base shape is shown: {place}"),
-                    Note::Skinned => format!("skins are not applied, the rest pose is shown: {place}"),
-                    Note::Collapsed => {
-                        format!("left out what a transform flattens to nothing: {place}")
-                    }
-                    Note::MissingUv => {
-                        format!("a texture refers to texture coordinates that the mesh lacks; they are taken as 0: {place}")
-                    }
-                    Note::EmptyTexture => format!("a texture without an image was ignored: {place}"),
-                    Note::Clamped => format!("clamped {count} material factors to their range in {place}"),
-                }
-            });
-        counted
-            .chain(self.plain)
-            .map(|line| {
-                line.chars()
-                    .map(|c| if c.is_control() { ' ' } else { c })
-                    .collect()
-            })
-            .collect()
-    }
 }

@@ -2,9 +2,13 @@
 
 mod accepted;
 mod images;
+mod mutations;
+mod objects;
 mod refused;
 
 use std::path::{Path, PathBuf};
+
+use glam::DVec3;
 
 use super::{Scene, SceneError, load};
 
@@ -28,6 +32,10 @@ impl Folder {
         std::fs::write(&path, text).expect("a writable folder");
         load(&path)
     }
+}
+
+fn near(a: DVec3, b: [f64; 3]) -> bool {
+    (a - DVec3::from(b)).length() < 1e-12
 }
 
 /// Loads a scene of this text alone.

@@ -1,8 +1,6 @@
 //! Every class of error: its place, exactly, and its message.
 
-use proptest::prelude::*;
-
-use super::super::{SceneError, error::Source, file::read_scene};
+use super::super::SceneError;
 use super::{CAMERA, Folder, load_text};
 
 /// Loads `text` without its marker `@@`, and asserts that the error stands where the marker was and says `fragment`.
@@ -467,101 +465,4 @@ fn a_scene_file_that_cannot_be_read() {
         .unwrap_err()
         .to_string();
     assert!(latin1.contains("latin1.toml:2:6: "), "{latin1}");
-}
-
-const VALID: &str = r#"
-[photo]
-exposure_ev = 0.5
-[camera]
-width = 32
-height = 24
-fx = 30.5
-fy = 31
-cx = 16.0
-distortion = [0.1, -0.02, 0.001, 0.0, 0.0]
-position = [0.0, 1.0, 2.0]
-look_at = [0, 0, 0]
-[lens]
-f_number = 2.8
-focal_length_mm = 50
-focus_distance_m = inf
-aperture = 7
-[environment]
-radiance = [1.0, 0.5, 0.25]
-[[light]]
-kind = "quad"
-corner = [0, 2, 0]
-edge_u = [1, 0, 0]
-edge_v = [0, 0, 1]
-radiance = [10, 10, 10]
-[[real]]
-shape = "quad"
-corner = [-1, 0, 1]
-edge_u = [2, 0, 0]
-edge_v = [0, 0, -2]
-material = { base_color = [0.6, 0.6, 0.6], roughness = 1.0 }
-[[virtual]]
-shape = "sphere"
-segments = 16
-translation = [0.1, 0.0, -0.2]
-rotation_deg = [0, 30, 0]
-scale = 0.1
-[render]
-rays_per_pixel = 49
-sampler = "cmj"
-"#;
-
-fn read_text(text: &str) -> Result<(), String> {
-    let source = Source::new("scene.toml".as_ref(), text.as_bytes().to_vec());
-    source
-        .and_then(|source| read_scene(&source))
-        .map(|_| ())
-        .map_err(|error| error.to_string())
-}
-
-#[test]
-fn the_scene_that_is_mutated_is_valid() {
-    assert_eq!(read_text(VALID), Ok(()));
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
-
-    /// Whatever is done to a valid file, it loads or is refused in one line with its place.
-    #[test]
-    fn mutations_never_panic(edits in prop::collection::vec((any::<prop::sample::Index>(), 0..6_usize, any::<prop::sample::Index>()), 1..6)) {
-        const PIECES: [&str; 20] = ["nan", "-", "[", "]", "\"", "=", "1e999", "0", "inf", "{", "}", "\n", "é", "\u{0}", "9999999999", "[[x]]", ".", ",", "true", "\\"];
-        let mut text: Vec<char> = VALID.chars().collect();
-        for (place, action, pick) in edits {
-            let place = place.index(text.len().max(1)).min(text.len());
-            match action {
-                0 => { text.splice(place..place, PIECES[pick.index(PIECES.len())].chars()); }
-                1 => { let end = (place + 1 + pick.index(8)).min(text.len()); text.drain(place..end); }
-                2 => { let from = pick.index(text.len()); let to = (from + 30).min(text.len()); let copy = text[from..to].to_vec(); text.splice(place..place, copy); }
-                3 => text.truncate(place.max(1)),
-                _ => if let Some(slot) = text.get_mut(place) { *slot = PIECES[pick.index(PIECES.len())].chars().next().unwrap_or(' '); }
-            }
-            if text.is_empty() { text.push('\n'); }
-        }
-        let text: String = text.into_iter().collect();
-        if let Err(message) = read_text(&text) {
-            prop_assert!(message.starts_with("scene.toml:"), "{}", message);
-            prop_assert!(!message.contains('\n'), "{}", message);
-        }
-    }
-
-    /// Any number in any place of a valid file.
-    #[test]
-    fn any_number_anywhere_never_panics(which in any::<prop::sample::Index>(), bits in any::<u64>()) {
-        let tokens: Vec<&str> = VALID.split_inclusive([' ', ',', '[', ']', '\n']).collect();
-        let numeric: Vec<usize> = (0..tokens.len()).filter(|i| tokens[*i].starts_with(|c: char| c.is_ascii_digit())).collect();
-        let target = numeric[which.index(numeric.len())];
-        let number = format!("{:?}", f64::from_bits(bits)).replace("NaN", "nan");
-        let text: String = tokens.iter().enumerate().map(|(i, token)| {
-            if i == target { format!("{number}{}", token.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.')) } else { (*token).to_owned() }
-        }).collect();
-        if let Err(message) = read_text(&text) {
-            prop_assert!(message.starts_with("scene.toml:"), "{}", message);
-        }
-    }
 }
