@@ -8,9 +8,9 @@ use super::measurement::{BlockMoments, Moments};
 use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
 
 /// Squared error aimed at, relative to that of one sample a ray everywhere.
-const ERROR_SHARE: f32 = 0.5;
+const ERROR_SHARE: f32 = 0.6;
 /// A difference is evaluated at one ray in this many at the least; a pixel takes this many samples a ray at the most.
-const LONGEST_PERIOD: f32 = 16.0;
+const LONGEST_PERIOD: f32 = 8.0;
 const LARGEST_FACTOR: f32 = 16.0;
 /// Blocks to either side whose samples make one estimate, and those that an estimate leans on, with the weight of this many pixels.
 const NEAR_BLOCKS: usize = 1;
@@ -52,8 +52,9 @@ impl Rates {
 
 /// What is known of a block once its neighbours have been asked.
 struct Expected {
-    /// Share of the block's samples that meet virtual geometry.
+    /// Share of the block's samples that meet virtual geometry, and of its pixels whose beams may.
     mixed_share: f32,
+    near_share: f32,
     difference: Moments,
     mixed: Moments,
     least_difference_rate: f32,
@@ -85,6 +86,7 @@ pub fn allocate(blocks: &Blocks, measured: &[BlockMoments], importance: &[f32]) 
         .zip(importance)
         .map(|((m, (difference, mixed)), importance)| Expected {
             mixed_share: m.mixed.pixels / (m.mixed.pixels + m.difference.pixels).max(1.0),
+            near_share: m.near_share,
             difference,
             mixed,
             least_difference_rate: (IMPORTANCE_SHARE * importance).clamp(1.0 / LONGEST_PERIOD, 1.0),
@@ -103,7 +105,8 @@ pub fn allocate(blocks: &Blocks, measured: &[BlockMoments], importance: &[f32]) 
                 e.difference.error / rates.difference,
                 e.mixed.error / rates.mixed,
             );
-            samples += e.mean(rates.difference, rates.mixed);
+            let near = rates.difference.max(rates.mixed);
+            samples += (1.0 - e.near_share) * rates.difference + e.near_share * near;
         }
         error <= ERROR_SHARE * error_of_one || samples >= expected.len() as f32
     };

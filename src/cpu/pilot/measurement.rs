@@ -43,6 +43,8 @@ impl std::ops::AddAssign for Moments {
 pub struct BlockMoments {
     pub difference: Moments,
     pub mixed: Moments,
+    /// Share of the pixels whose beams may meet virtual geometry.
+    pub near_share: f32,
 }
 
 /// Takes two samples in some pixels of every block. `scene.pixels` must ask for every sample's difference.
@@ -50,15 +52,17 @@ pub fn measure(scene: &PackedScene, blocks: &Blocks) -> Vec<BlockMoments> {
     (0..blocks.count())
         .into_par_iter()
         .map(|block| {
-            let flags = blocks
-                .pixels(block)
-                .fold(0, |flags, p| flags | scene.pixels[p].flags);
-            let count = if flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0 {
+            let is_near = |&p: &usize| scene.pixels[p].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0;
+            let near = blocks.pixels(block).filter(is_near).count();
+            let count = if near > 0 {
                 PIXELS_NEAR_VIRTUAL
             } else {
                 PIXELS
             };
-            let mut moments = BlockMoments::default();
+            let mut moments = BlockMoments {
+                near_share: near as f32 / blocks.pixels(block).count() as f32,
+                ..BlockMoments::default()
+            };
             for i in 0..count {
                 let random = hash_u32(hash_combine(
                     hash_combine(scene.frame.seed, block as u32),

@@ -22,6 +22,7 @@ fn bands(errors: &[f32], costs: &[f32]) -> (Blocks, Vec<BlockMoments>) {
                     cost: costs[band],
                 },
                 mixed: Moments::default(),
+                near_share: 0.0,
             }
         })
         .collect();
@@ -93,7 +94,7 @@ fn what_geometry_warns_of_is_sampled_though_nothing_was_measured() {
     let warned = middles(&allocate(&blocks, &moments, &importance), 2);
     let silent = middles(&allocate(&blocks, &moments, &vec![0.0; blocks.count()]), 2);
     assert!(warned[1] >= 0.25, "{warned:?}");
-    assert!(silent[1] < 0.1, "control: {silent:?}");
+    assert!(silent[1] < 0.2, "control: {silent:?}");
     assert!(
         silent[1] >= 1.0 / 16.0,
         "never without a chance: {silent:?}"
