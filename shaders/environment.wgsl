@@ -35,7 +35,7 @@ struct Neighbours {
     c11: vec3<f32>,
     fx: f32,
     fy: f32,
-    fy_solid_angle: f32,
+    row: f32,
 }
 
 @if(environment_map)
@@ -63,7 +63,7 @@ fn env_neighbours(u: f32, v: f32) -> Neighbours {
     let j1 = min(u32(max(t0 + 1.0, 0.0)), height - 1u);
     return Neighbours(
         env_texel(i0, j0), env_texel(i1, j0), env_texel(i0, j1), env_texel(i1, j1), s - s0, t - t0,
-        row_solid_angle_above(t0 + 1.0, v, f32(height)),
+        t0 + 1.0,
     );
 }
 
@@ -87,21 +87,25 @@ fn env_interpolate(n: Neighbours, fy: f32) -> vec3<f32> {
     return top + (bottom - top) * fy;
 }
 
-@if(environment_map)
 struct EnvEvaluation {
     pdf: f32,
     radiance: vec3<f32>,
 }
 
-@if(environment_map)
 fn env_evaluate(direction: vec3<f32>) -> EnvEvaluation {
-    let c = env_coordinates(direction);
-    let n = env_neighbours(c.x, c.y);
-    let interpolated = max(luminance(env_interpolate(n, n.fy_solid_angle)), 0.0);
-    return EnvEvaluation(
-        interpolated * frame.env_radiance.w,
-        env_interpolate(n, n.fy) * frame.env_radiance.xyz,
-    );
+    @if(environment_map) {
+        if frame.env_width != 0u {
+            let c = env_coordinates(direction);
+            let n = env_neighbours(c.x, c.y);
+            let above = row_solid_angle_above(n.row, c.y, f32(frame.env_height));
+            let interpolated = max(luminance(env_interpolate(n, above)), 0.0);
+            return EnvEvaluation(
+                interpolated * frame.env_radiance.w,
+                env_interpolate(n, n.fy) * frame.env_radiance.xyz,
+            );
+        }
+    }
+    return EnvEvaluation(0.25 / PI, frame.env_radiance.xyz);
 }
 
 fn env_radiance(direction: vec3<f32>) -> vec3<f32> {
@@ -113,15 +117,6 @@ fn env_radiance(direction: vec3<f32>) -> vec3<f32> {
         }
     }
     return frame.env_radiance.xyz;
-}
-
-fn env_direction_pdf(direction: vec3<f32>) -> f32 {
-    @if(environment_map) {
-        if frame.env_width != 0u {
-            return env_evaluate(direction).pdf;
-        }
-    }
-    return 0.25 / PI;
 }
 
 @if(environment_map)

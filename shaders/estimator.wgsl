@@ -6,7 +6,7 @@ import package::cones::cone_pdf;
 import package::contribution::{accumulate, density_weight, sample_key};
 import package::environment::env_radiance;
 import package::lens::camera_ray;
-import package::lights::env_pdf;
+import package::lights::env_arriving;
 import package::math::{dot3, hash_combine, hash_u32};
 import package::sampler::sample_4d;
 import package::state::{
@@ -259,8 +259,13 @@ fn paper_behind(st: ptr<function, PathState>) {
 
 fn path_escape(st: ptr<function, PathState>) {
     if (*st).depth == 1u && (frame.flags & FRAME_ENV_DRAWN) == 0u { return; }
-    let weight = density_weight((*st).density, env_pdf((*st).direction));
-    accumulate(st, (*st).throughput * env_radiance((*st).direction) * weight);
+    accumulate(st, escaping_light(st));
+}
+
+fn escaping_light(st: ptr<function, PathState>) -> vec3<f32> {
+    if (*st).density == DELTA_DENSITY { return (*st).throughput * env_radiance((*st).direction); }
+    let arriving = env_arriving((*st).direction);
+    return (*st).throughput * arriving.radiance * density_weight((*st).density, arriving.pdf);
 }
 
 fn path_shadow(st: ptr<function, PathState>) {
@@ -317,8 +322,7 @@ fn vertex_cone_density(st: ptr<function, PathState>) -> f32 {
 
 fn split_difference(st: ptr<function, PathState>) {
     if (*st).hit_real.triangle == NONE {
-        let weight = density_weight((*st).density, env_pdf((*st).direction));
-        (*st).radiance -= (*st).throughput * env_radiance((*st).direction) * weight;
+        (*st).radiance -= escaping_light(st);
     } else {
         (*st).pending |= PENDING_REAL;
         (*st).real_hit = (*st).hit_real;

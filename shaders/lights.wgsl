@@ -3,7 +3,7 @@
 import package::bindings::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE, frame, lights,
 };
-import package::environment::{env_direction_pdf, env_sample};
+import package::environment::{env_evaluate, env_radiance, env_sample};
 import package::math::{cross3, dot3, length3, safe_sqrt};
 import package::state::FAR;
 @if(area_lights) import package::rectangle::{rectangle_from, sample_rectangle};
@@ -119,7 +119,13 @@ fn light_pdf_hit(light: u32, from_position: vec3<f32>, direction: vec3<f32>, dis
     return area_pdf(record, direction, distance);
 }
 
-fn env_pdf(direction: vec3<f32>) -> f32 {
-    if frame.env_light == NONE { return 0.0; }
-    return env_direction_pdf(direction) * lights[frame.env_light].select_pdf;
+struct EnvArriving {
+    radiance: vec3<f32>,
+    pdf: f32,
+}
+
+fn env_arriving(direction: vec3<f32>) -> EnvArriving {
+    if frame.env_light == NONE { return EnvArriving(env_radiance(direction), 0.0); }
+    let e = env_evaluate(direction);
+    return EnvArriving(e.radiance, e.pdf * lights[frame.env_light].select_pdf);
 }

@@ -14,7 +14,7 @@ use crate::camera::lens::camera_ray;
 use crate::camera::sampler::sample_4d;
 use crate::light::cones::{Cones, cone_pdf};
 use crate::light::environment::env_radiance;
-use crate::light::lights::env_pdf;
+use crate::light::lights::env_arriving;
 use crate::material::{Surface, bsdf_albedo, surface_at};
 use crate::math::{hash_combine, hash_u32};
 use crate::packed::{FRAME_AOVS, FRAME_ENV_DRAWN, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene};
@@ -308,9 +308,16 @@ fn path_escape(scene: &PackedScene, st: &mut PathState) {
     if st.depth == 1 && scene.frame.flags & FRAME_ENV_DRAWN == 0 {
         return;
     }
-    let weight = density_weight(st.density, env_pdf(scene, st.direction));
-    let light = st.throughput * env_radiance(scene, st.direction) * weight;
+    let light = escaping_light(scene, st);
     accumulate(scene, st, light);
+}
+
+fn escaping_light(scene: &PackedScene, st: &PathState) -> Vec3 {
+    if st.density == DELTA_DENSITY {
+        return st.throughput * env_radiance(scene, st.direction);
+    }
+    let (radiance, pdf) = env_arriving(scene, st.direction);
+    st.throughput * radiance * density_weight(st.density, pdf)
 }
 
 fn path_shadow(scene: &PackedScene, st: &mut PathState) {
@@ -383,8 +390,7 @@ fn vertex_cone_density(scene: &PackedScene, st: &PathState) -> f32 {
 /// Virtual geometry is nearer: its radiance counts, and what the real world shows behind it is taken away.
 fn split_difference(scene: &PackedScene, st: &mut PathState) {
     if st.hit_real.triangle == NONE {
-        let weight = density_weight(st.density, env_pdf(scene, st.direction));
-        st.radiance -= st.throughput * env_radiance(scene, st.direction) * weight;
+        st.radiance -= escaping_light(scene, st);
     } else {
         st.pending |= PENDING_REAL;
         st.real_hit = st.hit_real;

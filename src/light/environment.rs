@@ -120,8 +120,8 @@ struct Neighbours {
     fx: f32,
     /// Share of the row's angle above the point.
     fy: f32,
-    /// Share of the row's solid angle above the point.
-    fy_solid_angle: f32,
+    /// Lower texel's row: the row of cells that the point lies in.
+    row: f32,
 }
 
 /// Upper and lower edge of a row of cells, as v.
@@ -149,7 +149,7 @@ fn env_neighbours(scene: &PackedScene, u: f32, v: f32) -> Neighbours {
         c11: env_texel(scene, i1, j1),
         fx: s - s0,
         fy: t - t0,
-        fy_solid_angle: row_solid_angle_above(t0 + 1.0, v, height as f32),
+        row: t0 + 1.0,
     }
 }
 
@@ -168,11 +168,15 @@ fn env_interpolate(n: &Neighbours, fy: f32) -> Vec3 {
     top + (bottom - top) * fy
 }
 
-/// Density of [`env_sample`] per solid angle, and the map's radiance.
-fn env_evaluate(scene: &PackedScene, direction: Vec3) -> (f32, Vec3) {
+/// Density per solid angle with which [`env_sample`] draws `direction`, and the radiance that arrives from it.
+pub fn env_evaluate(scene: &PackedScene, direction: Vec3) -> (f32, Vec3) {
+    if scene.frame.env_width == 0 {
+        return (0.25 / PI, env_scale(&scene.frame));
+    }
     let (u, v) = env_coordinates(&scene.frame, direction);
     let n = env_neighbours(scene, u, v);
-    let interpolated = luminance(env_interpolate(&n, n.fy_solid_angle)).max(0.0);
+    let above = row_solid_angle_above(n.row, v, scene.frame.env_height as f32);
+    let interpolated = luminance(env_interpolate(&n, above)).max(0.0);
     (
         interpolated * scene.frame.env_radiance[3],
         env_interpolate(&n, n.fy) * env_scale(&scene.frame),
@@ -195,14 +199,6 @@ pub fn env_radiance(scene: &PackedScene, direction: Vec3) -> Vec3 {
     let (u, v) = env_coordinates(&scene.frame, direction);
     let n = env_neighbours(scene, u, v);
     env_interpolate(&n, n.fy) * env_scale(&scene.frame)
-}
-
-/// Density per solid angle with which [`env_sample`] draws `direction`.
-pub fn env_direction_pdf(scene: &PackedScene, direction: Vec3) -> f32 {
-    if scene.frame.env_width == 0 {
-        return 0.25 / PI;
-    }
-    env_evaluate(scene, direction).0
 }
 
 /// Inverts the distribution whose density runs linearly from `a` to `b` over 0..1; uniform where both are 0.
@@ -275,7 +271,7 @@ pub fn env_sample(scene: &PackedScene, u0: f32, u1: f32) -> EnvSample {
         y,
         z * frame.env_cos - x * frame.env_sin,
     );
-    // Looked up from the direction, so that this density and env_direction_pdf's are the same number.
+    // Looked up from the direction, so that this density and env_evaluate's are the same number.
     let (pdf, radiance) = env_evaluate(scene, direction);
     EnvSample {
         direction,

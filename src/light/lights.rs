@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::environment::{env_direction_pdf, env_sample};
+use super::environment::{env_evaluate, env_radiance, env_sample};
 use super::rectangle::{rectangle_from, sample_rectangle};
 use crate::material::triangle_emission;
 use crate::math::{cross3, dot3, length3, safe_sqrt};
@@ -191,10 +191,12 @@ pub fn light_pdf_hit(
     area_pdf(record, direction, distance)
 }
 
-/// Density with which [`light_sample`] draws the environment in `direction`.
-pub fn env_pdf(scene: &PackedScene, direction: Vec3) -> f32 {
+/// Radiance that arrives from the environment along `direction`, and the density with which [`light_sample`] draws it.
+pub fn env_arriving(scene: &PackedScene, direction: Vec3) -> (Vec3, f32) {
     if scene.frame.env_light == NONE {
-        return 0.0;
+        return (env_radiance(scene, direction), 0.0);
     }
-    env_direction_pdf(scene, direction) * scene.lights[scene.frame.env_light as usize].select_pdf
+    let (pdf, radiance) = env_evaluate(scene, direction);
+    let select_pdf = scene.lights[scene.frame.env_light as usize].select_pdf;
+    (radiance, pdf * select_pdf)
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec3, Vec3};
 
 use super::{Random, lit_by, map_environment, pearson};
-use crate::light::environment::{env_direction_pdf, env_radiance, env_sample};
+use crate::light::environment::{env_evaluate, env_radiance, env_sample};
 use crate::packed::NONE;
 use crate::scene::{Environment, EnvironmentMap};
 
@@ -191,7 +191,7 @@ fn radiance_and_density_are_the_f64_ones() {
                     "{name} {d}: {radiance} {want}"
                 );
             }
-            let found = f64::from(env_direction_pdf(&scene, d));
+            let found = f64::from(env_evaluate(&scene, d).0);
             let want = map.density(u, v) / whole;
             let level = f64::from(brightest) / whole;
             assert!(near(found, want, level), "{name} {d}: {found} {want}");
@@ -229,7 +229,7 @@ fn samples_follow_the_density() {
             let s = env_sample(&scene, a, b);
             assert!(s.pdf > 0.0 && s.direction.is_finite() && s.radiance.is_finite());
             assert!((s.direction.length() - 1.0).abs() < 1e-6);
-            assert_eq!(s.pdf, env_direction_pdf(&scene, s.direction), "{name}");
+            assert_eq!(s.pdf, env_evaluate(&scene, s.direction).0, "{name}");
             assert_eq!(s.radiance, env_radiance(&scene, s.direction), "{name}");
             let (u, v) = coordinates(s.direction);
             let column = ((u * columns as f64) as usize).min(columns - 1);

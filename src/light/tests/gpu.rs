@@ -9,7 +9,7 @@ use crate::light::cones::{
     Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
 };
 use crate::light::environment::env_radiance;
-use crate::light::lights::{env_pdf, light_pdf_hit, light_sample, light_select};
+use crate::light::lights::{env_arriving, light_pdf_hit, light_sample, light_select};
 use crate::packed::PackedScene;
 use crate::scene::{Environment, EnvironmentMap, LightKind};
 
@@ -22,7 +22,7 @@ output_vec3(0u, s.direction);
 output_f32(3u, s.distance);
 output_vec3(4u, s.radiance);
 output_f32(7u, s.pdf);
-output_f32(8u, env_pdf(direction));
+output_f32(8u, env_arriving(direction).pdf);
 output_vec3(9u, env_radiance(direction));
 let c = cone_sample(position, direction, u.xyz);
 output_vec3(12u, c.direction);
@@ -35,7 +35,7 @@ output_f32(19u, light_pdf_hit(light_select(u.x, u.w), position, s.direction, s.d
 const PRELUDE: &str = "
 import package::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
 import package::environment::env_radiance;
-import package::lights::{env_pdf, light_pdf_hit, light_sample, light_select};
+import package::lights::{env_arriving, light_pdf_hit, light_sample, light_select};
 ";
 const OUTPUTS: usize = 20;
 
@@ -57,7 +57,7 @@ fn on_the_cpu(scene: &PackedScene, input: &[f32]) -> [f32; OUTPUTS] {
         s.radiance.y,
         s.radiance.z,
         s.pdf,
-        env_pdf(scene, direction),
+        env_arriving(scene, direction).1,
         radiance.x,
         radiance.y,
         radiance.z,

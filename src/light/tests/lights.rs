@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{Random, fit, lit_by};
-use crate::light::lights::{env_pdf, light_pdf_hit, light_sample, light_select};
+use crate::light::lights::{env_arriving, light_pdf_hit, light_sample, light_select};
 use crate::material::{surface_at, triangle_emission};
 use crate::packed::{LIGHT_TRIANGLE, PackedScene, test_mesh, test_scene};
 use crate::scene::{
@@ -61,7 +61,7 @@ fn the_alias_table_has_the_stated_probabilities() {
             assert!(statistic > limit);
         }
         assert!(
-            (env_pdf(&scene, Vec3::X) * 4.0 * std::f32::consts::PI
+            (env_arriving(&scene, Vec3::X).1 * 4.0 * std::f32::consts::PI
                 / scene.lights[count].select_pdf
                 - 1.0)
                 .abs()
