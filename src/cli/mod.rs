@@ -3,6 +3,7 @@
 //! Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 a check failed, 2 usage or input, 130 ended by
 //! Ctrl-C with the picture written.
 
+mod cartoon;
 mod compare;
 mod info;
 mod interrupt;
@@ -11,9 +12,12 @@ mod render;
 mod summary;
 
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use crate::scene::Photo;
 
 /// Renders virtual objects into photographs as the same camera would have taken them.
 #[derive(Debug, Parser)]
@@ -26,6 +30,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(render::Arguments),
+    Cartoon(cartoon::Arguments),
     Compare(compare::Arguments),
     Info(info::Arguments),
 }
@@ -52,6 +57,7 @@ impl<E: std::error::Error> From<E> for Failure {
 pub fn run() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
+        Command::Cartoon(arguments) => cartoon::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
     };
@@ -64,6 +70,16 @@ pub fn run() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Reads an image of any program, warnings said.
+fn read_photo(path: &Path) -> Result<Photo, Failure> {
+    let (photo, warnings) =
+        Photo::read(path).map_err(|problem| Failure(format!("{}: {problem}", path.display())))?;
+    for warning in warnings {
+        say("warning", &format!("{}: {warning}", path.display()));
+    }
+    Ok(photo)
 }
 
 /// A message to the user, one line.

@@ -14,6 +14,7 @@ use crate::renderer::{Budget, Renderer, RendererOptions, Stats};
 use crate::scene::{
     self, BackendChoice, Choice, Composite, Estimator, Overrides, SamplerKind, Settings,
 };
+use crate::stages::finish;
 
 /// Renders a scene's virtual objects into its photograph
 ///
@@ -167,7 +168,7 @@ fn write(
     targets: &[Target],
     png_bits: Option<PngBits>,
 ) -> Result<(), Failure> {
-    let picture = renderer.picture();
+    let picture = finish(renderer.picture(), &renderer.scene().stages);
     let photo = renderer.scene().photo.as_ref();
     for target in targets {
         match target.format() {

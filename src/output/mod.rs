@@ -1,10 +1,12 @@
 //! Pictures to files: PNG and multilayer EXR, written beside the target and renamed, so that no broken picture is ever left.
 
 mod exr_file;
+mod plain;
 mod png_file;
 mod target;
 
 pub use exr_file::{Metadata, write_exr};
+pub use plain::write_image;
 pub use png_file::{PngBits, write_png};
 pub(crate) use target::check_writable;
 pub use target::{Format, Target, write_text};

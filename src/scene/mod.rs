@@ -20,6 +20,7 @@ mod settings;
 mod shape;
 pub mod smooth;
 pub mod srgb;
+mod stages;
 #[cfg(test)]
 mod tests;
 
@@ -27,6 +28,7 @@ pub use error::SceneError;
 pub use file::load;
 pub use reader::Choice;
 pub use settings::Overrides;
+pub use stages::{CartoonSettings, CartoonStyle, FlowSettings, Stages};
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -53,6 +55,7 @@ pub struct Scene {
     pub lights: Vec<Light>,
     pub objects: Vec<Object>,
     pub settings: Settings,
+    pub stages: Stages,
     /// Things worth telling the user that are not errors (dropped triangles, ignored gamma chunks).
     pub warnings: Vec<String>,
 }

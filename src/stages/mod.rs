@@ -1,0 +1,11 @@
+//! Camera stages: what a camera does to a picture after the composite, or what replaces it.
+//!
+//! Order: composite, boundary antialiasing, noise, response and quantisation; or composite, cartoon. A stage knows no ray: it
+//! works on the film of a render and on images of other programs alike.
+
+pub mod cartoon;
+mod encoded;
+mod finish;
+
+pub use encoded::EncodedImage;
+pub use finish::finish;

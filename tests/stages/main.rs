@@ -1,0 +1,3 @@
+//! Camera stages against independent transcriptions and simulated cameras.
+
+mod cartoon;
