@@ -3,10 +3,13 @@
 //! Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 a check failed, 2 usage or input, 130 ended by
 //! Ctrl-C with the picture written.
 
+mod antialias;
 mod cartoon;
 mod compare;
 mod info;
 mod interrupt;
+mod layers;
+mod noise;
 mod progress;
 mod render;
 mod summary;
@@ -31,6 +34,8 @@ struct Arguments {
 enum Command {
     Render(render::Arguments),
     Cartoon(cartoon::Arguments),
+    Noise(noise::Arguments),
+    Antialias(antialias::Arguments),
     Compare(compare::Arguments),
     Info(info::Arguments),
 }
@@ -58,6 +63,8 @@ pub fn run() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Cartoon(arguments) => cartoon::run(&arguments),
+        Command::Noise(arguments) => noise::run(&arguments),
+        Command::Antialias(arguments) => antialias::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
     };

@@ -52,6 +52,9 @@ pub(super) struct Arguments {
     /// Write times and counts as JSON
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
+    /// Frame number of a video: with [noise], every frame has its own
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    frame: u32,
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
@@ -78,6 +81,7 @@ pub(super) struct Job {
     overrides: Overrides,
     png_bits: Option<PngBits>,
     stats: Option<PathBuf>,
+    frame: u32,
     threads: Option<u16>,
 }
 
@@ -105,6 +109,7 @@ impl Arguments {
             },
             png_bits: self.png_bits,
             stats: self.stats,
+            frame: self.frame,
             threads: self.threads,
         })
     }
@@ -149,7 +154,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     warn_of_non_finite(&renderer);
 
     let start = Instant::now();
-    write(&renderer, &targets, job.png_bits)?;
+    write(&renderer, &targets, job.png_bits, job.frame)?;
     let write_secs = start.elapsed().as_secs_f64();
     let stats = Stats::new(&renderer, load_secs, write_secs);
     if let Some(path) = &job.stats {
@@ -167,8 +172,13 @@ fn write(
     renderer: &Renderer,
     targets: &[Target],
     png_bits: Option<PngBits>,
+    frame: u32,
 ) -> Result<(), Failure> {
-    let picture = finish(renderer.picture(), &renderer.scene().stages);
+    let finished = finish(renderer.picture(), renderer.film(), renderer.scene(), frame);
+    for note in &finished.notes {
+        say("note", note);
+    }
+    let picture = finished.picture;
     let photo = renderer.scene().photo.as_ref();
     for target in targets {
         match target.format() {

@@ -6,7 +6,7 @@ mod png_file;
 mod target;
 
 pub use exr_file::{Metadata, write_exr};
-pub use plain::write_image;
+pub use plain::{write_composite, write_image};
 pub use png_file::{PngBits, write_png};
 pub(crate) use target::check_writable;
 pub use target::{Format, Target, write_text};

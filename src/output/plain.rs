@@ -9,6 +9,7 @@ use super::exr_file::rec709;
 use super::target::write_atomically;
 use super::{Format, OutputError, PngBits, Target, write_png};
 use crate::film::Picture;
+use crate::scene::Photo;
 
 /// Writes a linear Rec.709 picture: PNG of `bits` a channel, or EXR.
 ///
@@ -17,6 +18,22 @@ use crate::film::Picture;
 pub fn write_image(target: &Target, picture: &Picture, bits: PngBits) -> Result<(), OutputError> {
     match target.format() {
         Format::Png => write_png(target, picture, None, bits),
+        Format::Exr => write_rgb(target, picture),
+    }
+}
+
+/// [`write_image`] of a picture over `photo`: pixels that equal the photograph's bit for bit get the photograph's own codes.
+///
+/// # Errors
+/// As [`write_image`].
+pub fn write_composite(
+    target: &Target,
+    picture: &Picture,
+    photo: &Photo,
+    bits: PngBits,
+) -> Result<(), OutputError> {
+    match target.format() {
+        Format::Png => write_png(target, picture, Some(photo), bits),
         Format::Exr => write_rgb(target, picture),
     }
 }

@@ -32,7 +32,7 @@ const TABLES: &[&str] = &[
 ];
 
 /// Known to the format; rendering without them would silently give another picture than the one asked for.
-const NOT_APPLIED: &[&str] = &["shutter", "noise", "antialias", "motion_blur"];
+const NOT_APPLIED: &[&str] = &["shutter", "motion_blur"];
 
 /// Reads a scene file (TOML) and everything it names.
 ///

@@ -11,6 +11,7 @@ pub mod gltf;
 mod image_file;
 mod light;
 mod material;
+mod noise_profile;
 mod object;
 mod photo;
 mod pose;
@@ -26,9 +27,17 @@ mod tests;
 
 pub use error::SceneError;
 pub use file::load;
+pub use noise_profile::{
+    Autocorrelation, LAGS, MAX_BINS, NOISE_PROFILE_VERSION, NoiseBin, NoiseFit, NoiseProfile,
+    WHITE, bin_index,
+};
+pub use photo::read_codes;
 pub use reader::Choice;
 pub use settings::Overrides;
-pub use stages::{CartoonSettings, CartoonStyle, FlowSettings, Stages};
+pub use stages::{
+    AntialiasSettings, CartoonSettings, CartoonStyle, FlowSettings, NoiseMethod, NoiseSettings,
+    Stages,
+};
 
 use std::path::PathBuf;
 use std::sync::Arc;

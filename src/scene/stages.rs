@@ -1,12 +1,75 @@
 //! `[cartoon]` and the other tables of camera stages. A stage whose table is absent is off.
 
+use super::NoiseProfile;
 use super::error::Result;
 use super::reader::{Choice, Node, Table};
 
 /// The stages that a scene asks for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stages {
+    pub antialias: Option<AntialiasSettings>,
+    pub noise: Option<NoiseSettings>,
+    /// Never beside the others: it replaces what makes a picture look photographed.
     pub cartoon: Option<CartoonSettings>,
+}
+
+/// Blending of virtual border pixels with their real neighbours, for pictures whose mask is binary.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AntialiasSettings {
+    /// Share of the blended colour, 0 to 1; 0 changes nothing.
+    pub beta: f32,
+}
+
+impl Default for AntialiasSettings {
+    fn default() -> Self {
+        Self { beta: 0.8 }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoiseMethod {
+    /// As much as is missing, drawn for each pixel with the measured correlation.
+    Missing,
+    /// The paper's: noise textures over the virtual pixels.
+    Textures,
+}
+
+impl Choice for NoiseMethod {
+    const CHOICES: &'static [(&'static str, Self)] =
+        &[("missing", Self::Missing), ("textures", Self::Textures)];
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct NoiseSettings {
+    pub profile: NoiseProfile,
+    pub method: NoiseMethod,
+    /// Factor on the noise that is added; 1 is the camera's own.
+    pub scale: f32,
+    /// Side of the textures, a power of two.
+    pub texture_size: u32,
+    /// Pixels that one texel covers along each axis.
+    pub magnification: f32,
+    /// Frames that keep the same noise.
+    pub update_delay_frames: u32,
+    /// Textures rounded to 8 bits, as the paper's are.
+    pub eight_bit: bool,
+}
+
+impl NoiseSettings {
+    /// Largest texture side, texels.
+    pub const MAX_TEXTURE_SIZE: u32 = 4096;
+
+    pub fn new(profile: NoiseProfile) -> Self {
+        Self {
+            profile,
+            method: NoiseMethod::Missing,
+            scale: 1.0,
+            texture_size: 512,
+            magnification: 1.0,
+            update_delay_frames: 1,
+            eight_bit: false,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,6 +157,16 @@ impl Default for FlowSettings {
     }
 }
 
+const NOISE_KEYS: &[&str] = &[
+    "profile",
+    "method",
+    "scale",
+    "texture_size",
+    "magnification",
+    "update_delay_frames",
+    "eight_bit",
+];
+
 const CARTOON_KEYS: &[&str] = &[
     "style",
     "shrunk_width",
@@ -124,12 +197,68 @@ impl CartoonSettings {
 }
 
 pub(super) fn read_stages(root: &Table) -> Result<Stages> {
+    for stage in ["noise", "antialias"] {
+        root.refuse_both("cartoon", stage)?;
+    }
     Ok(Stages {
+        antialias: root
+            .table("antialias", "[antialias]", &["beta"])?
+            .map(|table| read_antialias(&table))
+            .transpose()?,
+        noise: root
+            .table("noise", "[noise]", NOISE_KEYS)?
+            .map(|table| read_noise(&table))
+            .transpose()?,
         cartoon: root
             .table("cartoon", "[cartoon]", CARTOON_KEYS)?
             .map(|table| read_cartoon(&table))
             .transpose()?,
     })
+}
+
+fn read_antialias(table: &Table) -> Result<AntialiasSettings> {
+    let mut settings = AntialiasSettings::default();
+    read(table, "beta", &mut settings.beta, |node| node.unit())?;
+    Ok(settings)
+}
+
+fn read_noise(table: &Table) -> Result<NoiseSettings> {
+    let profile = table.required("profile", "profile = \"noise.toml\"", |node| {
+        let path = node.existing_file()?;
+        NoiseProfile::read(&path).map_err(|problem| node.file_error(&path, &problem))
+    })?;
+    let mut settings = NoiseSettings::new(profile);
+    read(table, "method", &mut settings.method, |node| node.choice())?;
+    read(table, "scale", &mut settings.scale, |node| {
+        let expected = "a number from 0 to 1000";
+        Ok(node.number(expected, |x| (0.0..=1e3).contains(&x))? as f32)
+    })?;
+    read(table, "texture_size", &mut settings.texture_size, |node| {
+        let most = NoiseSettings::MAX_TEXTURE_SIZE;
+        let size = node.integer(1, most)?;
+        if size.is_power_of_two() {
+            Ok(size)
+        } else {
+            Err(node.impossible(format!("a power of two, at most {most}")))
+        }
+    })?;
+    read(
+        table,
+        "magnification",
+        &mut settings.magnification,
+        |node| {
+            let expected = "a number from 0.01 to 1000";
+            Ok(node.number(expected, |x| (0.01..=1e3).contains(&x))? as f32)
+        },
+    )?;
+    let delay = &mut settings.update_delay_frames;
+    read(table, "update_delay_frames", delay, |node| {
+        node.integer(1, u32::MAX)
+    })?;
+    read(table, "eight_bit", &mut settings.eight_bit, |node| {
+        node.boolean()
+    })?;
+    Ok(settings)
 }
 
 fn read_cartoon(table: &Table) -> Result<CartoonSettings> {
@@ -147,8 +276,8 @@ fn read_cartoon(table: &Table) -> Result<CartoonSettings> {
         let expected = "a number from 0.0001 to 1000";
         Ok(node.number(expected, |x| (1e-4..=1e3).contains(&x))? as f32)
     })?;
-    read(table, "alpha", &mut settings.alpha, Node::unit)?;
-    read(table, "beta", &mut settings.beta, Node::unit)?;
+    read(table, "alpha", &mut settings.alpha, |node| node.unit())?;
+    read(table, "beta", &mut settings.beta, |node| node.unit())?;
     read_step(table, ["s0", "s1"], &mut settings.s0, &mut settings.s1)?;
     read_step(table, ["a0", "a1"], &mut settings.a0, &mut settings.a1)?;
     let flow = &mut settings.flow;
@@ -160,7 +289,7 @@ fn read_cartoon(table: &Table) -> Result<CartoonSettings> {
     )?;
     read(table, "edge_sigma_px", &mut flow.edge_sigma_px, flow_sigma)?;
     read(table, "line_sigma_px", &mut flow.line_sigma_px, flow_sigma)?;
-    read(table, "tau", &mut flow.tau, Node::unit)?;
+    read(table, "tau", &mut flow.tau, |node| node.unit())?;
     read_step(table, ["t0", "t1"], &mut flow.t0, &mut flow.t1)?;
     Ok(settings)
 }

@@ -1,16 +1,102 @@
-//! The stages that a scene asks for, in their order.
+//! The stages that a scene asks for, in their order, on a film's composite.
 
 use super::EncodedImage;
+use super::antialias::antialias;
 use super::cartoon::cartoon;
-use crate::film::Picture;
-use crate::scene::Stages;
+use super::noise::{NoiseInput, NoiseStage};
+use crate::film::{Film, Picture, QUOTIENT_EPSILON, variance};
+use crate::scene::{Composite, NoiseMethod, SamplerKind, Scene};
 
-/// Applies the stages to a composite. Without a stage it comes back as it is.
-pub fn finish(picture: Picture, stages: &Stages) -> Picture {
-    match &stages.cartoon {
-        Some(settings) => cartoon(&EncodedImage::from_picture(&picture), settings, false)
-            .image
-            .to_picture(),
-        None => picture,
+/// A finished picture and what the user should hear about it.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    pub picture: Picture,
+    pub notes: Vec<String>,
+}
+
+/// Applies the scene's stages to the composite `picture` of `film`, as frame number `frame` of a video. Without a stage the picture
+/// comes back as it is, and nothing is computed.
+pub fn finish(mut picture: Picture, film: &Film, scene: &Scene, frame: u32) -> Finished {
+    let stages = &scene.stages;
+    let mut notes = Vec::new();
+    if let Some(settings) = &stages.cartoon {
+        let image = EncodedImage::from_picture(&picture);
+        picture = cartoon(&image, settings, false).image.to_picture();
+    }
+    if let Some(settings) = &stages.antialias {
+        let mask = mask(film);
+        if !antialias(&mut picture, &mask, settings) {
+            notes.push("[antialias] is off: the film's borders are smooth already".to_owned());
+        }
+    }
+    if let Some(settings) = &stages.noise {
+        let stage = NoiseStage::new(settings, scene.settings.seed);
+        let mask = mask(film);
+        let mut input = NoiseInput {
+            photo: scene.photo.as_ref().map(|photo| photo.linear.as_slice()),
+            mask: Some(&mask),
+            ..NoiseInput::default()
+        };
+        if scene.photo.is_none() {
+            // Nothing was photographed: the whole picture lacks noise.
+            input.mask = None;
+        }
+        let ratio = ratio(film, scene.settings.composite);
+        input.ratio = ratio.as_deref();
+        let variance = match settings.method {
+            NoiseMethod::Missing => Some(estimate_variance(film, scene)),
+            NoiseMethod::Textures => None,
+        };
+        input.variance = variance.as_deref();
+        stage.apply(&mut picture, &input, frame);
+    }
+    Finished { picture, notes }
+}
+
+/// M of each pixel.
+fn mask(film: &Film) -> Vec<f32> {
+    film.pixels
+        .iter()
+        .map(|sums| sums.m as f32 / sums.n.max(1) as f32)
+        .collect()
+}
+
+/// What the quotient composite multiplied the photograph with; None for the additive one, which leaves it as it is.
+fn ratio(film: &Film, composite: Composite) -> Option<Vec<[f32; 3]>> {
+    if composite == Composite::Additive {
+        return None;
+    }
+    let ratios = film.pixels.iter().map(|sums| {
+        if sums.n == 0 || sums.n_real == 0 {
+            return [1.0; 3];
+        }
+        let difference = sums.diff.value() / f64::from(sums.n);
+        let real = sums.r_ir.value() / f64::from(sums.n_real);
+        let ratio = difference / real.max(glam::DVec3::splat(QUOTIENT_EPSILON));
+        (ratio + glam::DVec3::ONE)
+            .max(glam::DVec3::ZERO)
+            .as_vec3()
+            .to_array()
+    });
+    Some(ratios.collect())
+}
+
+/// The estimate's own variance, linear: the samples' variance, which is that of independent samples, less what stratification takes away.
+fn estimate_variance(film: &Film, scene: &Scene) -> Vec<[f32; 3]> {
+    let mut plane = variance(film, scene.photo.as_ref());
+    for (variance, sums) in plane.iter_mut().zip(&film.pixels) {
+        let gain = stratification_gain(scene.settings.sampler, sums.n);
+        *variance = variance.map(|v| if sums.n > 1 { v * gain } else { 0.0 });
+    }
+    plane
+}
+
+/// Variance of a stratified mean over that of independent samples, on defocused edges (design: the table of section 5). The first
+/// power of ten of samples follows n^-1/2 for Sobol and cmj, n^-1/4 for jittered.
+fn stratification_gain(sampler: SamplerKind, samples: u32) -> f32 {
+    let n = samples.max(1) as f32;
+    match sampler {
+        SamplerKind::Sobol | SamplerKind::Cmj => 1.0 / n.sqrt(),
+        SamplerKind::Jittered => 1.0 / n.sqrt().sqrt(),
     }
 }

@@ -3,9 +3,13 @@
 //! Order: composite, boundary antialiasing, noise, response and quantisation; or composite, cartoon. A stage knows no ray: it
 //! works on the film of a render and on images of other programs alike.
 
+pub mod antialias;
+pub mod calibration;
 pub mod cartoon;
+pub mod curve;
 mod encoded;
 mod finish;
+pub mod noise;
 
 pub use encoded::EncodedImage;
-pub use finish::finish;
+pub use finish::{Finished, finish};

@@ -326,7 +326,7 @@ fn the_flow_style_draws_whole_lines_along_contours() {
             .map(|i| {
                 let radius = disc((i % width) as f32, (i / width) as f32);
                 let noise = hash(i) as f32 / u32::MAX as f32 - 0.5;
-                [if radius < 30.0 { 0.45 } else { 0.6 } + 0.04 * noise; 3]
+                [if radius < 30.0 { 0.3 } else { 0.6 } + 0.04 * noise; 3]
             })
             .collect(),
     };
