@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::layers::LayerArguments;
+use super::stage_device::StageDevice;
 use super::{Failure, Outcome, print, say};
 use crate::output::{Target, write_composite};
 use crate::scene::AntialiasSettings;
@@ -23,6 +24,8 @@ pub(super) struct Arguments {
     /// Share of the blended colour in a border pixel
     #[arg(long, value_name = "X", default_value_t = 0.8, value_parser = unit)]
     beta: f32,
+    #[command(flatten)]
+    device: StageDevice,
 }
 
 fn unit(text: &str) -> Result<f32, &'static str> {
@@ -38,7 +41,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let settings = AntialiasSettings {
         beta: arguments.beta,
     };
-    if !antialias(&mut layers.picture, &layers.mask, &settings) {
+    let done = match arguments.device.open()? {
+        Some(gpu) => gpu.antialias(&mut layers.picture, &layers.mask, &settings)?,
+        None => antialias(&mut layers.picture, &layers.mask, &settings),
+    };
+    if !done {
         say("note", "the mask is soft already: nothing is blended");
     }
     write_composite(&target, &layers.picture, &layers.photo, layers.bits())?;

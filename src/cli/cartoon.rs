@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 
+use super::stage_device::StageDevice;
 use super::{Failure, Outcome, print, read_photo};
 use crate::output::{PngBits, Target, write_image};
 use crate::scene::{CartoonSettings, CartoonStyle, Choice};
@@ -29,6 +30,8 @@ pub(super) struct Arguments {
     edges: Option<PathBuf>,
     #[command(flatten)]
     keys: Keys,
+    #[command(flatten)]
+    device: StageDevice,
 }
 
 #[derive(Debug, Args)]
@@ -126,8 +129,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let bits = PngBits::for_photo(Some(&photo));
     let image = EncodedImage::from_photo(&photo);
     let settings = arguments.keys.settings();
+    let with_edges = edges_target.is_some();
+    let gpu = arguments.device.open()?;
+    let compute = || match &gpu {
+        Some(gpu) => gpu.cartoon(&image, &settings, with_edges),
+        None => Ok(cartoon(&image, &settings, with_edges)),
+    };
+    if gpu.is_some() {
+        // Kernels are compiled at their first use: that is no time of the cartoon.
+        compute()?;
+    }
     let start = Instant::now();
-    let result = cartoon(&image, &settings, edges_target.is_some());
+    let result = compute()?;
     let seconds = start.elapsed().as_secs_f64();
     write_image(&target, &result.image.to_picture(), bits)?;
     if let (Some(target), Some(edges)) = (&edges_target, &result.edges) {

@@ -12,6 +12,7 @@ mod layers;
 mod noise;
 mod progress;
 mod render;
+mod stage_device;
 mod summary;
 
 use std::io::Write;

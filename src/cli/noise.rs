@@ -7,6 +7,7 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 
 use super::layers::LayerArguments;
+use super::stage_device::StageDevice;
 use super::{Failure, Outcome, print, progress, say};
 use crate::output::{Target, check_writable, write_composite, write_text};
 use crate::scene::{Choice, NoiseFit, NoiseMethod, NoiseProfile, NoiseSettings};
@@ -106,6 +107,8 @@ struct Apply {
     /// Frame number of a video: every frame has its own noise
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
+    #[command(flatten)]
+    device: StageDevice,
 }
 
 fn factor(text: &str) -> Result<f32, &'static str> {
@@ -224,13 +227,18 @@ fn run_apply(arguments: &Apply) -> Result<Outcome, Failure> {
         ..NoiseSettings::new(profile)
     };
     let mut layers = arguments.layers.read()?;
+    let gpu = arguments.device.open()?;
     let start = Instant::now();
     let input = NoiseInput {
         photo: Some(&layers.photo.linear),
         mask: Some(&layers.mask),
         ..NoiseInput::default()
     };
-    NoiseStage::new(&settings, arguments.seed).apply(&mut layers.picture, &input, arguments.frame);
+    let stage = NoiseStage::new(&settings, arguments.seed);
+    match gpu {
+        Some(gpu) => gpu.noise(&stage, &mut layers.picture, &input, arguments.frame)?,
+        None => stage.apply(&mut layers.picture, &input, arguments.frame),
+    }
     let seconds = start.elapsed().as_secs_f64();
     write_composite(&target, &layers.picture, &layers.photo, layers.bits())?;
     print(&format!(

@@ -7,6 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::{Failure, Outcome, interrupt, print, progress, say, summary};
+use crate::gpu::GpuStages;
 use crate::output::{
     Format, Metadata, PngBits, Target, check_writable, write_exr, write_png, write_text,
 };
@@ -174,7 +175,14 @@ fn write(
     png_bits: Option<PngBits>,
     frame: u32,
 ) -> Result<(), Failure> {
-    let finished = finish(renderer.picture(), renderer.film(), renderer.scene(), frame);
+    let gpu = renderer.gpu_device().cloned().map(GpuStages::new);
+    let finished = finish(
+        renderer.picture(),
+        renderer.film(),
+        renderer.scene(),
+        frame,
+        gpu.as_ref(),
+    );
     for note in &finished.notes {
         say("note", note);
     }

@@ -5,6 +5,7 @@ use super::antialias::antialias;
 use super::cartoon::cartoon;
 use super::noise::{NoiseInput, NoiseStage};
 use crate::film::{Film, Picture, QUOTIENT_EPSILON, variance};
+use crate::gpu::{GpuError, GpuStages};
 use crate::scene::{Composite, NoiseMethod, SamplerKind, Scene};
 
 /// A finished picture and what the user should hear about it.
@@ -15,17 +16,28 @@ pub struct Finished {
 }
 
 /// Applies the scene's stages to the composite `picture` of `film`, as frame number `frame` of a video. Without a stage the picture
-/// comes back as it is, and nothing is computed.
-pub fn finish(mut picture: Picture, film: &Film, scene: &Scene, frame: u32) -> Finished {
+/// comes back as it is, and nothing is computed. They run on `gpu` if there is one and it can; else on the CPU.
+pub fn finish(
+    mut picture: Picture,
+    film: &Film,
+    scene: &Scene,
+    frame: u32,
+    gpu: Option<&GpuStages>,
+) -> Finished {
     let stages = &scene.stages;
     let mut notes = Vec::new();
     if let Some(settings) = &stages.cartoon {
         let image = EncodedImage::from_picture(&picture);
-        picture = cartoon(&image, settings, false).image.to_picture();
+        let done = on_gpu(gpu, &mut notes, |gpu| gpu.cartoon(&image, settings, false));
+        let result = done.unwrap_or_else(|| cartoon(&image, settings, false));
+        picture = result.image.to_picture();
     }
     if let Some(settings) = &stages.antialias {
         let mask = mask(film);
-        if !antialias(&mut picture, &mask, settings) {
+        let done = on_gpu(gpu, &mut notes, |gpu| {
+            gpu.antialias(&mut picture, &mask, settings)
+        });
+        if !done.unwrap_or_else(|| antialias(&mut picture, &mask, settings)) {
             notes.push("[antialias] is off: the film's borders are smooth already".to_owned());
         }
     }
@@ -48,9 +60,31 @@ pub fn finish(mut picture: Picture, film: &Film, scene: &Scene, frame: u32) -> F
             NoiseMethod::Textures => None,
         };
         input.variance = variance.as_deref();
-        stage.apply(&mut picture, &input, frame);
+        let done = on_gpu(gpu, &mut notes, |gpu| {
+            gpu.noise(&stage, &mut picture, &input, frame)
+        });
+        if done.is_none() {
+            stage.apply(&mut picture, &input, frame);
+        }
     }
     Finished { picture, notes }
+}
+
+/// What `run` gives on the GPU; None without one, or where it cannot, which is noted.
+fn on_gpu<T>(
+    gpu: Option<&GpuStages>,
+    notes: &mut Vec<String>,
+    run: impl FnOnce(&GpuStages) -> Result<T, GpuError>,
+) -> Option<T> {
+    match run(gpu?) {
+        Ok(done) => Some(done),
+        Err(error) => {
+            notes.push(format!(
+                "a stage runs on the CPU, for the GPU cannot: {error}"
+            ));
+            None
+        }
+    }
 }
 
 /// M of each pixel.

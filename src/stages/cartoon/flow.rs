@@ -57,8 +57,7 @@ impl Field {
     }
 
     /// Convolved with a Gaussian, rows then columns.
-    fn blurred(&self, sigma: f32) -> Self {
-        let weights = half_gaussian(sigma);
+    fn blurred(&self, weights: &[f32]) -> Self {
         let along = |dx: isize, dy: isize, field: &Field| {
             Field::new(field.width, field.height, |x, y| {
                 let (x, y) = (x as isize, y as isize);
@@ -76,7 +75,7 @@ impl Field {
 }
 
 /// Weights at 0, 1, 2, ... pixels, to 2.5 standard deviations, so that both sides and the centre add up to 1.
-pub(super) fn half_gaussian(sigma: f32) -> Vec<f32> {
+fn half_gaussian(sigma: f32) -> Vec<f32> {
     let radius = (2.5 * sigma).ceil() as usize;
     let weights: Vec<f64> = (0..=radius)
         .map(|step| (-0.5 * (step as f64 / f64::from(sigma)).powi(2)).exp())
@@ -85,14 +84,24 @@ pub(super) fn half_gaussian(sigma: f32) -> Vec<f32> {
     weights.iter().map(|weight| (weight / sum) as f32).collect()
 }
 
+/// Half Gaussians of the style: of the tensor, the inner and the outer one across a contour, the one along it.
+pub fn flow_weights(settings: &FlowSettings) -> [Vec<f32>; 4] {
+    [
+        settings.tensor_sigma_px,
+        settings.edge_sigma_px,
+        OUTER * settings.edge_sigma_px,
+        settings.line_sigma_px,
+    ]
+    .map(half_gaussian)
+}
+
 /// How dark a line is at each pixel, 0 to 1, row-major.
 pub(super) fn lines(image: &Planes, settings: &FlowSettings) -> Vec<f32> {
     let (width, height) = (image.width, image.height);
-    let tangents = tangents(image, settings.tensor_sigma_px);
+    let [tensor, inner, outer, along] = flow_weights(settings);
+    let tangents = tangents(image, &tensor);
     let luma = Field::new(width, height, |x, y| image.row(0, y as isize)[PAD + x]);
 
-    let inner = half_gaussian(settings.edge_sigma_px);
-    let outer = half_gaussian(OUTER * settings.edge_sigma_px);
     let across = Field::new(width, height, |x, y| {
         let (tx, ty) = tangents.at(x, y);
         let (x, y) = (x as f32, y as f32);
@@ -111,7 +120,6 @@ pub(super) fn lines(image: &Planes, settings: &FlowSettings) -> Vec<f32> {
         sum
     });
 
-    let along = half_gaussian(settings.line_sigma_px);
     Field::new(width, height, |x, y| {
         let (tx, ty) = tangents.at(x, y);
         let mut sum = along[0] * across.values[y * width + x];
@@ -153,7 +161,7 @@ impl Tangents {
 }
 
 /// From the structure tensor of Y, U and V: its minor eigenvector, along +X where there is no contour.
-fn tangents(image: &Planes, sigma: f32) -> Tangents {
+fn tangents(image: &Planes, weights: &[f32]) -> Tangents {
     let (width, height) = (image.width, image.height);
     let product = |a: usize, b: usize| {
         Field::new(width, height, |x, y| {
@@ -171,7 +179,7 @@ fn tangents(image: &Planes, sigma: f32) -> Tangents {
             }
             sum
         })
-        .blurred(sigma)
+        .blurred(weights)
     };
     let (xx, xy, yy) = (product(0, 0), product(0, 1), product(1, 1));
     let tangent = |x: usize, y: usize| {
@@ -185,7 +193,7 @@ fn tangents(image: &Planes, sigma: f32) -> Tangents {
 }
 
 /// Unit eigenvector of the smaller eigenvalue of [[xx, xy], [xy, yy]].
-pub(super) fn minor_eigenvector(xx: f32, xy: f32, yy: f32) -> (f32, f32) {
+fn minor_eigenvector(xx: f32, xy: f32, yy: f32) -> (f32, f32) {
     let difference = xx - yy;
     let root = (difference * difference + 4.0 * xy * xy).sqrt();
     // Of the two equal forms of the vector the one that does not subtract like from like.

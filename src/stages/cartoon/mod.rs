@@ -21,6 +21,7 @@ use rayon::prelude::*;
 use super::EncodedImage;
 use crate::scene::{CartoonSettings, CartoonStyle};
 use edges::{gradient_row, smoothstep};
+pub use flow::flow_weights;
 use planes::{PAD, Planes, rgb_from_yuv};
 
 /// Red and blue weights of brightness (BT.601); green has the rest.

