@@ -4,9 +4,10 @@ use super::EncodedImage;
 use super::antialias::antialias;
 use super::cartoon::cartoon;
 use super::noise::{NoiseInput, NoiseStage};
-use crate::film::{Film, Picture, QUOTIENT_EPSILON, variance};
+use super::own_variance::own_variance;
+use crate::film::{Film, Picture, QUOTIENT_EPSILON};
 use crate::gpu::{GpuError, GpuStages};
-use crate::scene::{Composite, NoiseMethod, SamplerKind, Scene};
+use crate::scene::{Composite, NoiseMethod, Scene};
 
 /// A finished picture and what the user should hear about it.
 #[derive(Clone, Debug)]
@@ -56,7 +57,12 @@ pub fn finish(
         let ratio = ratio(film, scene.settings.composite);
         input.ratio = ratio.as_deref();
         let variance = match settings.method {
-            NoiseMethod::Missing => Some(estimate_variance(film, scene)),
+            NoiseMethod::Missing => Some(own_variance(
+                film,
+                &picture,
+                scene.photo.as_ref(),
+                scene.settings.sampler,
+            )),
             NoiseMethod::Textures => None,
         };
         input.variance = variance.as_deref();
@@ -113,24 +119,4 @@ fn ratio(film: &Film, composite: Composite) -> Option<Vec<[f32; 3]>> {
             .to_array()
     });
     Some(ratios.collect())
-}
-
-/// The estimate's own variance, linear: the samples' variance, which is that of independent samples, less what stratification takes away.
-fn estimate_variance(film: &Film, scene: &Scene) -> Vec<[f32; 3]> {
-    let mut plane = variance(film, scene.photo.as_ref());
-    for (variance, sums) in plane.iter_mut().zip(&film.pixels) {
-        let gain = stratification_gain(scene.settings.sampler, sums.n);
-        *variance = variance.map(|v| if sums.n > 1 { v * gain } else { 0.0 });
-    }
-    plane
-}
-
-/// Variance of a stratified mean over that of independent samples, on defocused edges (design: the table of section 5). The first
-/// power of ten of samples follows n^-1/2 for Sobol and cmj, n^-1/4 for jittered.
-fn stratification_gain(sampler: SamplerKind, samples: u32) -> f32 {
-    let n = samples.max(1) as f32;
-    match sampler {
-        SamplerKind::Sobol | SamplerKind::Cmj => 1.0 / n.sqrt(),
-        SamplerKind::Jittered => 1.0 / n.sqrt().sqrt(),
-    }
 }

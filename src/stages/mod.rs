@@ -10,6 +10,7 @@ pub mod curve;
 mod encoded;
 mod finish;
 pub mod noise;
+mod own_variance;
 
 pub use encoded::EncodedImage;
 pub use finish::{Finished, finish};
