@@ -55,8 +55,8 @@ fn rgb_at(index: u32) -> vec3<f32> {
 }
 
 fn overlap(part: u32, pixel: u32, large: u32, small: u32) -> f32 {
-    let common = min((part + 1u) * large, (pixel + 1u) * small) - max(part * large, pixel * small);
-    return f32(common) / f32(large);
+    let covered = min((part + 1u) * large, (pixel + 1u) * small) - max(part * large, pixel * small);
+    return f32(covered) / f32(large);
 }
 
 @compute @workgroup_size(8, 8)

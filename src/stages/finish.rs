@@ -7,7 +7,7 @@ use super::noise::{NoiseInput, NoiseStage};
 use super::own_variance::own_variance;
 use crate::film::{Film, Picture, QUOTIENT_EPSILON};
 use crate::gpu::{GpuError, GpuStages};
-use crate::scene::{Composite, NoiseMethod, Scene};
+use crate::scene::{Composite, NoiseMethod, NoiseSettings, Scene};
 
 /// A finished picture and what the user should hear about it.
 #[derive(Clone, Debug)]
@@ -62,6 +62,7 @@ pub fn finish(
                 &picture,
                 scene.photo.as_ref(),
                 scene.settings.sampler,
+                smallest_sigma(settings),
             )),
             NoiseMethod::Textures => None,
         };
@@ -119,4 +120,10 @@ fn ratio(film: &Film, composite: Composite) -> Option<Vec<[f32; 3]>> {
             .to_array()
     });
     Some(ratios.collect())
+}
+
+/// DN, over bins and channels.
+fn smallest_sigma(settings: &NoiseSettings) -> f32 {
+    let sigmas = settings.profile.bins.iter().flat_map(|bin| bin.sigma);
+    sigmas.fold(f64::INFINITY, f64::min) as f32
 }

@@ -4,6 +4,8 @@
 //! they integrate. Two upper estimates are at hand, and the smaller one is taken: the samples' variance times what stratification gains
 //! on defocused edges, the hardest case; and the variance within 5 x 5 pixels about their plane, which texture enlarges.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::film::{Film, Picture, variance};
@@ -16,46 +18,73 @@ const COUNT: f32 = (SIDE * SIDE) as f32;
 /// Sum of squared offsets from the centre, over the window.
 const SPREAD: f32 = 50.0;
 
-/// Variance of `picture`, linear, that stems from the rendering; 0 where a single sample says nothing about it.
+/// A variance below this share of the camera's is not worth a closer look.
+const NEGLIGIBLE: f32 = 0.02;
+
+/// Variance of `picture`, linear, that stems from the rendering; 0 where a single sample says nothing about it. `camera_sigma_dn` is the
+/// camera's smallest sigma: what is far below it is only roughly estimated.
 pub fn own_variance(
     film: &Film,
     picture: &Picture,
     photo: Option<&Photo>,
     sampler: SamplerKind,
+    camera_sigma_dn: f32,
 ) -> Vec<[f32; 3]> {
     let mut plane = variance(film, photo);
-    for (variance, sums) in plane.iter_mut().zip(&film.pixels) {
-        let gain = match sums.n {
-            0 | 1 => 0.0,
-            n => stratification_gain(sampler, n),
-        };
-        *variance = variance.map(|v| v * gain);
-    }
     let (width, height) = (film.width as usize, film.height as usize);
-    let rows: Vec<bool> = plane
-        .chunks(width)
-        .map(|row| row.iter().any(|v| *v != [0.0; 3]))
-        .collect();
-    let near = |y: usize, reach: usize| {
-        let first = y.saturating_sub(reach);
-        rows[first..(y + reach + 1).min(height)].contains(&true)
-    };
-    let estimate = without_photo(film, picture, photo, &|y| near(y, REACH));
-    plane
+    // By row, the columns that deserve a closer look.
+    let ranges: Vec<Range<usize>> = plane
         .par_chunks_mut(width)
         .enumerate()
-        .filter(|(y, _)| rows[*y])
-        .for_each(|(y, row)| {
+        .map(|(y, row)| {
+            let mut range = width..0;
             for (x, variance) in row.iter_mut().enumerate() {
-                if *variance != [0.0; 3] {
-                    let spread = spread_about_plane(&estimate, width, height, x, y);
-                    for c in 0..3 {
-                        variance[c] = variance[c].min(spread[c]);
-                    }
+                let index = y * width + x;
+                let gain = match film.pixels[index].n {
+                    0 | 1 => 0.0,
+                    n => stratification_gain(sampler, n),
+                };
+                *variance = variance.map(|v| v * gain);
+                if !is_negligible(variance, &picture.linear[index], camera_sigma_dn) {
+                    range = range.start.min(x)..x + 1;
+                }
+            }
+            range
+        })
+        .collect();
+    let estimate = without_photo(film, picture, photo, &|y| {
+        let rows = &ranges[y.saturating_sub(REACH)..(y + REACH + 1).min(height)];
+        let start = rows.iter().map(|range| range.start).min().unwrap_or(0);
+        let end = rows.iter().map(|range| range.end).max().unwrap_or(0);
+        start.saturating_sub(REACH)..(end + REACH).min(width)
+    });
+    plane
+        .par_chunks_mut(width)
+        .zip(&ranges)
+        .enumerate()
+        .for_each(|(y, (row, range))| {
+            for x in range.clone() {
+                let index = y * width + x;
+                if is_negligible(&row[x], &picture.linear[index], camera_sigma_dn) {
+                    continue;
+                }
+                let spread = spread_about_plane(&estimate, width, height, x, y);
+                for c in 0..3 {
+                    row[x][c] = row[x][c].min(spread[c]);
                 }
             }
         });
     plane
+}
+
+/// Far below the camera's own variance at these linear values. The curve's slope is bounded from below by its straight end and by twice
+/// the value.
+fn is_negligible(variance: &[f32; 3], linear: &[f32; 3], camera_sigma_dn: f32) -> bool {
+    (0..3).all(|c| {
+        let slope = (2.0 * linear[c].min(1.0)).max(1.0 / 12.92);
+        let sigma = camera_sigma_dn * (1.0 / 255.0) * slope;
+        variance[c] <= NEGLIGIBLE * sigma * sigma
+    })
 }
 
 /// Variance of a stratified mean over that of independent samples, on defocused edges: n^-0.4 for Sobol and cmj, n^-0.25 for jittered
@@ -68,39 +97,37 @@ fn stratification_gain(sampler: SamplerKind, samples: u32) -> f32 {
     (samples as f32).powf(exponent)
 }
 
-/// The picture with the photograph's part smoothed, so that its noise and texture do not count as the estimate's; only rows that
-/// `wanted` asks for.
+/// The picture with the photograph's part smoothed, so that its noise and texture do not count as the estimate's; only the columns that
+/// `wanted` gives for each row.
 fn without_photo(
     film: &Film,
     picture: &Picture,
     photo: Option<&Photo>,
-    wanted: &(dyn Fn(usize) -> bool + Sync),
+    wanted: &(dyn Fn(usize) -> Range<usize> + Sync),
 ) -> Vec<[f32; 3]> {
     let (width, height) = (film.width as usize, film.height as usize);
     let mut out = picture.linear.clone();
     let Some(photo) = photo else { return out };
-    out.par_chunks_mut(width)
-        .enumerate()
-        .filter(|(y, _)| wanted(*y))
-        .for_each(|(y, row)| {
-            for (x, value) in row.iter_mut().enumerate() {
-                let sums = &film.pixels[y * width + x];
-                let share = 1.0 - sums.m as f32 / sums.n.max(1) as f32;
-                if share == 0.0 {
-                    continue;
-                }
-                let mut mean = [0.0; 3];
-                for_window(width, height, x, y, |index, _, _| {
-                    for c in 0..3 {
-                        mean[c] += photo.linear[index][c];
-                    }
-                });
-                for c in 0..3 {
-                    let own = photo.linear[y * width + x][c];
-                    value[c] -= share * (own - mean[c] / COUNT);
-                }
+    out.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        for x in wanted(y) {
+            let value = &mut row[x];
+            let sums = &film.pixels[y * width + x];
+            let share = 1.0 - sums.m as f32 / sums.n.max(1) as f32;
+            if share == 0.0 {
+                continue;
             }
-        });
+            let mut mean = [0.0; 3];
+            for_window(width, height, x, y, |index, _, _| {
+                for c in 0..3 {
+                    mean[c] += photo.linear[index][c];
+                }
+            });
+            for c in 0..3 {
+                let own = photo.linear[y * width + x][c];
+                value[c] -= share * (own - mean[c] / COUNT);
+            }
+        }
+    });
     out
 }
 
@@ -174,7 +201,7 @@ mod tests {
                 .collect();
             spreads.iter().sum::<f32>() / spreads.len() as f32
         };
-        assert!(mean(&values(0.0)) < 1e-9);
+        assert!(mean(&values(0.0)) < 1e-6);
         let spread = mean(&values(2.0));
         assert!((spread - 1.0).abs() < 0.03, "{spread}");
     }

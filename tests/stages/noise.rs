@@ -50,10 +50,10 @@ fn frames(folder: &Folder, settings: &NoiseSettings, seed: u32, count: u32) -> N
     let stage = NoiseStage::new(settings, seed);
     let paths: Vec<_> = (0..count)
         .map(|frame| {
-            let mut picture = ramp(256, 192);
+            let mut picture = ramp(192, 128);
             stage.apply(&mut picture, &NoiseInput::default(), frame);
-            folder.save(&format!("{frame:03}.png"), 256, 192, |x, y| {
-                picture.linear[(y * 256 + x) as usize].map(encode8)
+            folder.save(&format!("{frame:03}.png"), 192, 128, |x, y| {
+                picture.linear[(y * 192 + x) as usize].map(encode8)
             })
         })
         .collect();
@@ -81,7 +81,7 @@ fn sigma_errors(found: &NoiseProfile, truth: &NoiseProfile) -> (f64, f64) {
 #[test]
 fn calibrated_rendered_and_calibrated_again() {
     let truth = profile();
-    let found = frames(&Folder::new(), &NoiseSettings::new(truth.clone()), 3, 24);
+    let found = frames(&Folder::new(), &NoiseSettings::new(truth.clone()), 3, 16);
     let (median, most) = sigma_errors(&found, &truth);
     eprintln!(
         "sigma by bin and channel: median error {:.2}%, largest {:.2}%",
@@ -122,14 +122,14 @@ fn the_papers_textures_have_the_measured_sigma_too() {
         method: NoiseMethod::Textures,
         ..NoiseSettings::new(truth.clone())
     };
-    let found = frames(&Folder::new(), &settings, 3, 24);
+    let found = frames(&Folder::new(), &settings, 3, 16);
     let (median, most) = sigma_errors(&found, &truth);
     assert!(median < 0.02 && most < 0.05, "{found:?}");
     let scaled = NoiseSettings {
         scale: 1.5,
         ..settings
     };
-    let found = frames(&Folder::new(), &scaled, 3, 12);
+    let found = frames(&Folder::new(), &scaled, 3, 8);
     assert!(
         sigma_errors(&found, &truth).0 > 0.3,
         "control: another scale"
