@@ -116,15 +116,15 @@ fn without_photo(
             if share == 0.0 {
                 continue;
             }
-            let mut mean = [0.0; 3];
+            let mut mean = [0.0f32; 3];
             for_window(width, height, x, y, |index, _, _| {
-                for c in 0..3 {
-                    mean[c] += photo.linear[index][c];
+                for (mean, own) in mean.iter_mut().zip(photo.linear[index]) {
+                    *mean += own;
                 }
             });
-            for c in 0..3 {
-                let own = photo.linear[y * width + x][c];
-                value[c] -= share * (own - mean[c] / COUNT);
+            let own = photo.linear[y * width + x];
+            for ((value, own), mean) in value.iter_mut().zip(own).zip(mean) {
+                *value -= share * (own - mean / COUNT);
             }
         }
     });

@@ -47,8 +47,8 @@ fn transcription(picture: &Picture, mask: &[f32], beta: f64) -> Vec<[f64; 3]> {
                 for i in -1..=1 {
                     let inside = (0..WIDTH).contains(&(x + i)) && (0..HEIGHT).contains(&(y + j));
                     if inside && mask[at(x + i, y + j)] == 0.0 {
-                        for c in 0..3 {
-                            sum[c] += f64::from(picture.linear[at(x + i, y + j)][c]);
+                        for (sum, near) in sum.iter_mut().zip(picture.linear[at(x + i, y + j)]) {
+                            *sum += f64::from(near);
                         }
                         n += 1.0;
                     }

@@ -183,9 +183,11 @@ impl Residuals {
 fn solve(mut matrix: [[f64; FREE]; FREE], mut right: [f64; FREE]) -> [f64; FREE] {
     for i in 0..FREE {
         for j in i + 1..FREE {
-            let factor = matrix[j][i] / matrix[i][i];
-            for k in i..FREE {
-                matrix[j][k] -= factor * matrix[i][k];
+            let (upper, lower) = matrix.split_at_mut(j);
+            let (pivot, row) = (&upper[i], &mut lower[0]);
+            let factor = row[i] / pivot[i];
+            for (value, pivot) in row.iter_mut().zip(pivot).skip(i) {
+                *value -= factor * pivot;
             }
             right[j] -= factor * right[i];
         }
