@@ -13,7 +13,7 @@
 //!                              film::Film           per-pixel sums: mask, M*Im, difference, real radiance
 //!                                    │
 //!                                    v
-//!                              film::composite ──> output: PNG, EXR
+//!                              film::composite ──> stages: antialiasing, noise, or cartoon ──> output: PNG, EXR
 //! ```
 //!
 //! [`renderer::Renderer`] drives all of it: built once from a scene, advanced by a budget, asked for its film at any moment.
@@ -33,3 +33,4 @@ pub mod packed;
 pub mod renderer;
 pub mod report;
 pub mod scene;
+pub mod stages;

@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Failure, Outcome, print, say};
+use super::{Failure, Outcome, print, read_photo, say};
 use crate::film::{Picture, compare};
-use crate::scene::Photo;
 
 /// Prints the differences of two images as JSON
 ///
@@ -48,11 +47,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 }
 
 fn read(path: &Path) -> Result<Picture, Failure> {
-    let (photo, warnings) =
-        Photo::read(path).map_err(|problem| Failure(format!("{}: {problem}", path.display())))?;
-    for warning in warnings {
-        say("warning", &format!("{}: {warning}", path.display()));
-    }
+    let photo = read_photo(path)?;
     Ok(Picture {
         width: photo.width,
         height: photo.height,

@@ -65,7 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let total = first.note.total;
     let renderer = Renderer::with_film(scene, film)?;
     let complete = range == (0, total);
-    write(&renderer, &targets, arguments.png_bits, !complete)?;
+    write(&renderer, &targets, arguments.png_bits, 0, !complete)?;
     let mut out = String::new();
     for target in &targets {
         out += &format!(

@@ -3,19 +3,27 @@
 //! Results go to stdout, progress and messages to stderr. Exit codes: 0 done, 1 a check failed, 2 usage or input, 130 ended by
 //! Ctrl-C with the picture written.
 
+mod antialias;
 mod bench;
+mod cartoon;
 mod compare;
 mod info;
 mod interrupt;
+mod layers;
 mod merge;
+mod noise;
 mod progress;
 mod render;
+mod stage_device;
 mod summary;
 
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use crate::scene::Photo;
 
 /// Renders virtual objects into photographs as the same camera would have taken them.
 #[derive(Debug, Parser)]
@@ -30,6 +38,9 @@ enum Command {
     Render(render::Arguments),
     Merge(merge::Arguments),
     Bench(bench::Arguments),
+    Cartoon(cartoon::Arguments),
+    Noise(noise::Arguments),
+    Antialias(antialias::Arguments),
     Compare(compare::Arguments),
     Info(info::Arguments),
 }
@@ -58,6 +69,9 @@ pub fn run() -> ExitCode {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Merge(arguments) => merge::run(&arguments),
         Command::Bench(arguments) => arguments.check().and_then(bench::run),
+        Command::Cartoon(arguments) => cartoon::run(&arguments),
+        Command::Noise(arguments) => noise::run(&arguments),
+        Command::Antialias(arguments) => antialias::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
     };
@@ -70,6 +84,16 @@ pub fn run() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Reads an image of any program, warnings said.
+fn read_photo(path: &Path) -> Result<Photo, Failure> {
+    let (photo, warnings) =
+        Photo::read(path).map_err(|problem| Failure(format!("{}: {problem}", path.display())))?;
+    for warning in warnings {
+        say("warning", &format!("{}: {warning}", path.display()));
+    }
+    Ok(photo)
 }
 
 /// A message to the user, one line.

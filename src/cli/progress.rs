@@ -80,3 +80,33 @@ fn set_template(bar: &ProgressBar, template: &str) {
         bar.set_style(style);
     }
 }
+
+/// Things done of things to do.
+pub(super) struct Count {
+    bar: Option<ProgressBar>,
+}
+
+impl Count {
+    pub(super) fn new(what: &'static str) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(1);
+            set_template(&bar, "{wide_bar} {pos}/{len} {msg}, {eta} left");
+            bar.set_message(what);
+            bar
+        });
+        Self { bar }
+    }
+
+    pub(super) fn show(&self, done: u64, total: u64) {
+        if let Some(bar) = &self.bar {
+            bar.set_length(total);
+            bar.set_position(done);
+        }
+    }
+
+    pub(super) fn clear(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

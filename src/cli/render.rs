@@ -7,6 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::{Failure, Outcome, interrupt, print, progress, say, summary};
+use crate::gpu::GpuStages;
 use crate::output::{
     FilmNote, Format, Metadata, PngBits, Target, check_distinct, check_writable, write_exr,
     write_film, write_png, write_text,
@@ -15,6 +16,7 @@ use crate::renderer::{Budget, Renderer, RendererOptions, Skip, Stats, Without};
 use crate::scene::{
     self, BackendChoice, Choice, Composite, Estimator, Overrides, SamplerKind, Settings,
 };
+use crate::stages::finish;
 
 /// Renders a scene's virtual objects into its photograph
 ///
@@ -58,6 +60,9 @@ pub(super) struct Arguments {
     /// Do without a saving, to see what it is worth; may be given several times
     #[arg(long, value_name = "NAME", value_parser = choice::<Skip>())]
     no_skip: Vec<Skip>,
+    /// Frame number of a video: with [noise], every frame has its own
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    frame: u32,
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
@@ -84,6 +89,7 @@ pub(super) struct Job {
     overrides: Overrides,
     png_bits: Option<PngBits>,
     stats: Option<PathBuf>,
+    frame: u32,
     threads: Option<u16>,
     range: Option<(u32, u32)>,
     without: Without,
@@ -118,6 +124,7 @@ impl Arguments {
             },
             png_bits: self.png_bits,
             stats: self.stats,
+            frame: self.frame,
             threads: self.threads,
             range: self.range,
             without: self.no_skip.into_iter().collect(),
@@ -170,7 +177,13 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     warn_of_non_finite(&renderer);
 
     let start = Instant::now();
-    write(&renderer, &targets, job.png_bits, job.range.is_some())?;
+    write(
+        &renderer,
+        &targets,
+        job.png_bits,
+        job.frame,
+        job.range.is_some(),
+    )?;
     let write_secs = start.elapsed().as_secs_f64();
     let stats = Stats::new(&renderer, load_secs, write_secs);
     if let Some(path) = &job.stats {
@@ -192,9 +205,21 @@ pub(super) fn write(
     renderer: &Renderer,
     targets: &[Target],
     png_bits: Option<PngBits>,
+    frame: u32,
     with_film: bool,
 ) -> Result<(), Failure> {
-    let picture = renderer.picture();
+    let gpu = renderer.gpu_device().cloned().map(GpuStages::new);
+    let finished = finish(
+        renderer.picture(),
+        renderer.film(),
+        renderer.scene(),
+        frame,
+        gpu.as_ref(),
+    );
+    for note in &finished.notes {
+        say("note", note);
+    }
+    let picture = finished.picture;
     let photo = renderer.scene().photo.as_ref();
     for target in targets {
         match target.format() {

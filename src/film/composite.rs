@@ -147,6 +147,19 @@ pub fn estimated_error(film: &Film, photo: Option<&Photo>) -> f64 {
     (sum / film.pixels.len().max(1) as f64).sqrt()
 }
 
+/// The `variance` plane alone.
+pub fn variance(film: &Film, photo: Option<&Photo>) -> Vec<[f32; 3]> {
+    film.pixels
+        .par_iter()
+        .enumerate()
+        .map(|(pixel, sums)| {
+            variance_pixel(sums, photo_at(photo, pixel))
+                .as_vec3()
+                .to_array()
+        })
+        .collect()
+}
+
 /// All planes but the composite.
 pub fn planes(film: &Film, photo: Option<&Photo>) -> Planes {
     let rgb = |value: DVec3| value.as_vec3().to_array();
@@ -170,7 +183,7 @@ pub fn planes(film: &Film, photo: Option<&Photo>) -> Planes {
             let m = Means::of(sums);
             rgb(m.m_im - m.m_ir + m.diff)
         }),
-        variance: each(&|pixel, sums| rgb(variance_pixel(sums, photo_at(photo, pixel)))),
+        variance: variance(film, photo),
         mask: film
             .pixels
             .iter()

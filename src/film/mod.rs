@@ -8,7 +8,9 @@ mod sums;
 
 pub use accumulation::{Film, MergeError, PixelCounts, PixelKind};
 pub use compare::{Comparison, SizeMismatch, compare};
-pub use composite::{Picture, Planes, QUOTIENT_EPSILON, composite, estimated_error, planes};
+pub use composite::{
+    Picture, Planes, QUOTIENT_EPSILON, composite, estimated_error, planes, variance,
+};
 pub use flip::{flip, flip_map};
 pub use sums::{
     Guide, GuideSums, PixelSums, Sample, Sum3, guide_add, is_unusable, pixel_add, pixel_add_real,

@@ -150,6 +150,11 @@ impl GpuBackend {
         })
     }
 
+    /// The device, for the stages that follow.
+    pub fn device(&self) -> &Arc<GpuDevice> {
+        &self.gpu
+    }
+
     /// Name and driver of the device.
     pub fn device_name(&self) -> String {
         self.gpu.name()

@@ -77,7 +77,7 @@ impl Metadata {
 }
 
 /// ITU-R BT.709 primaries and D65.
-fn rec709() -> Chromaticities {
+pub(super) fn rec709() -> Chromaticities {
     Chromaticities {
         red: Vec2(0.64, 0.33),
         green: Vec2(0.30, 0.60),

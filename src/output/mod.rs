@@ -3,6 +3,7 @@
 mod channels;
 mod exr_file;
 mod film_file;
+mod plain;
 mod png_file;
 mod reference_file;
 mod target;
@@ -10,6 +11,7 @@ mod target;
 pub use channels::ChannelFile;
 pub use exr_file::{Metadata, write_exr};
 pub use film_file::{FilmNote, read_film, write_film};
+pub use plain::{write_composite, write_image};
 pub use png_file::{PngBits, write_png};
 pub use reference_file::write_reference;
 pub use target::{Format, Target, write_bytes, write_text};

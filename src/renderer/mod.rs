@@ -484,6 +484,14 @@ impl Renderer {
         &self.notes
     }
 
+    /// The graphics device that renders, if one does.
+    pub fn gpu_device(&self) -> Option<&Arc<GpuDevice>> {
+        match &self.backend {
+            Backend::Cpu | Backend::Undecided => None,
+            Backend::Gpu(gpu) => Some(gpu.device()),
+        }
+    }
+
     /// "cpu" or "gpu".
     pub fn backend_name(&self) -> &'static str {
         match self.backend {

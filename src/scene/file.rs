@@ -13,6 +13,7 @@ use super::object::ObjectReader;
 use super::photo::read_photo;
 use super::reader::Table;
 use super::settings::read_settings;
+use super::stages::read_stages;
 
 const TABLES: &[&str] = &[
     "photo",
@@ -31,7 +32,7 @@ const TABLES: &[&str] = &[
 ];
 
 /// Known to the format; rendering without them would silently give another picture than the one asked for.
-const NOT_APPLIED: &[&str] = &["shutter", "noise", "antialias", "motion_blur", "cartoon"];
+const NOT_APPLIED: &[&str] = &["shutter", "motion_blur"];
 
 /// Reads a scene file (TOML) and everything it names.
 ///
@@ -71,6 +72,7 @@ pub(super) fn read_scene(source: &Source) -> Result<Scene> {
     let mut warnings = Vec::new();
     let (photo, exposure) = read_photo(&root, &mut warnings)?;
     let settings = read_settings(&root, exposure)?;
+    let stages = read_stages(&root)?;
     let camera = read_camera(&root, photo.as_ref())?;
     let lens = read_lens(&root)?;
     let environment = read_environment(&root, &mut warnings)?;
@@ -91,6 +93,7 @@ pub(super) fn read_scene(source: &Source) -> Result<Scene> {
         objects,
         settings,
         inputs,
+        stages,
         warnings,
     })
 }

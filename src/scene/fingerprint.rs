@@ -25,6 +25,7 @@ impl Scene {
             name: _,
             path: _,
             inputs: _,
+            stages: _,
             photo,
             camera,
             lens,

@@ -12,6 +12,7 @@ pub mod gltf;
 mod image_file;
 mod light;
 mod material;
+mod noise_profile;
 mod object;
 mod photo;
 mod pose;
@@ -21,13 +22,23 @@ mod settings;
 mod shape;
 pub mod smooth;
 pub mod srgb;
+mod stages;
 #[cfg(test)]
 mod tests;
 
 pub use error::SceneError;
 pub use file::load;
+pub use noise_profile::{
+    Autocorrelation, LAGS, MAX_BINS, NOISE_PROFILE_VERSION, NoiseBin, NoiseFit, NoiseProfile,
+    WHITE, bin_index,
+};
+pub use photo::read_codes;
 pub use reader::Choice;
 pub use settings::Overrides;
+pub use stages::{
+    AntialiasSettings, CartoonSettings, CartoonStyle, FlowSettings, NoiseMethod, NoiseSettings,
+    Stages,
+};
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -56,6 +67,7 @@ pub struct Scene {
     pub settings: Settings,
     /// The files that the scene is made of, its own included.
     pub inputs: Vec<PathBuf>,
+    pub stages: Stages,
     /// Things worth telling the user that are not errors (dropped triangles, ignored gamma chunks).
     pub warnings: Vec<String>,
 }

@@ -47,6 +47,20 @@ fn read_photo_image(node: &Node, warnings: &mut Vec<String>) -> Result<Photo> {
     Ok(photo)
 }
 
+/// Width, height and codes of an image file as the camera stored them, with no colour decoded.
+///
+/// # Errors
+/// Why the file cannot be used, in one line without its path.
+pub fn read_codes(path: &Path) -> std::result::Result<(u32, u32, EncodedPhoto), String> {
+    let image = read_image(path)?;
+    let codes = match image.pixels {
+        Pixels::Srgb8(codes) => EncodedPhoto::Srgb8(codes),
+        Pixels::Srgb16(codes) => EncodedPhoto::Srgb16(codes),
+        Pixels::Linear(_) => EncodedPhoto::Linear,
+    };
+    Ok((image.width, image.height, codes))
+}
+
 impl Photo {
     /// Reads and decodes an image file (PNG, JPEG, OpenEXR, Radiance HDR), with warnings of what in it is ignored.
     ///

@@ -269,3 +269,67 @@ fn the_desk_camera() {
     assert_eq!((photo.width, photo.height), (640, 480));
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
 }
+
+/// The tables of camera stages: absent is off, empty is the documented defaults, and every key arrives.
+#[test]
+fn stages_are_off_default_or_as_given() {
+    use crate::scene::{AntialiasSettings, CartoonSettings, CartoonStyle, FlowSettings, Stages};
+    use crate::scene::{NoiseFit, NoiseMethod, NoiseProfile, NoiseSettings};
+
+    assert_eq!(load_with_camera("").stages, Stages::default());
+    let stages = load_with_camera("[cartoon]\n").stages;
+    assert_eq!(stages.cartoon, Some(CartoonSettings::default()));
+    assert!(stages.noise.is_none() && stages.antialias.is_none());
+
+    let given = load_with_camera(
+        "[cartoon]\nstyle = \"flow\"\nshrunk_width = 10\nshrunk_height = 20\niterations = 3\nsigma_p = 0.5\nalpha = 0.25\nbeta = 0.75\n\
+         s0 = 0.1\ns1 = 0.2\na0 = 0.4\na1 = 0.5\ntensor_sigma_px = 1.5\nedge_sigma_px = 2\nline_sigma_px = 2.5\ntau = 0.5\nt0 = 0.125\nt1 = 0.25\n",
+    );
+    let expected = CartoonSettings {
+        style: CartoonStyle::Flow,
+        shrunk_width: 10,
+        shrunk_height: 20,
+        iterations: 3,
+        sigma_p: 0.5,
+        alpha: 0.25,
+        beta: 0.75,
+        s0: 0.1,
+        s1: 0.2,
+        a0: 0.4,
+        a1: 0.5,
+        flow: FlowSettings {
+            tensor_sigma_px: 1.5,
+            edge_sigma_px: 2.0,
+            line_sigma_px: 2.5,
+            tau: 0.5,
+            t0: 0.125,
+            t1: 0.25,
+        },
+    };
+    assert_eq!(given.stages.cartoon, Some(expected));
+
+    let folder = Folder::new();
+    let profile = NoiseProfile::from_fit(NoiseFit { a: 0.0, b: 4.0 }, 4);
+    std::fs::write(folder.path("noise.toml"), profile.to_toml()).unwrap();
+    let load = |tables: &str| folder.load(&format!("{CAMERA}{tables}")).unwrap().stages;
+    let stages = load("[noise]\nprofile = \"noise.toml\"\n[antialias]\n");
+    assert_eq!(stages.antialias, Some(AntialiasSettings { beta: 0.8 }));
+    let noise = stages.noise.unwrap();
+    assert_eq!(noise.profile.bins, profile.bins);
+    assert_eq!(noise, NoiseSettings::new(noise.profile.clone()));
+    let stages = load(
+        "[noise]\nprofile = \"noise.toml\"\nmethod = \"textures\"\nscale = 2\ntexture_size = 64\nmagnification = 4\nupdate_delay_frames = 3\n\
+         eight_bit = true\n[antialias]\nbeta = 0.5\n",
+    );
+    assert_eq!(stages.antialias, Some(AntialiasSettings { beta: 0.5 }));
+    let expected = NoiseSettings {
+        method: NoiseMethod::Textures,
+        scale: 2.0,
+        texture_size: 64,
+        magnification: 4.0,
+        update_delay_frames: 3,
+        eight_bit: true,
+        ..noise
+    };
+    assert_eq!(stages.noise, Some(expected));
+}

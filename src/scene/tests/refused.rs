@@ -441,7 +441,7 @@ fn meshes_that_cannot_be_read() {
 
 #[test]
 fn stages_that_are_not_applied() {
-    for table in ["shutter", "noise", "antialias", "motion_blur", "cartoon"] {
+    for table in ["shutter", "motion_blur"] {
         assert_refused_with_camera(&format!("[@@{table}]\n"), "remove the table");
     }
 }

@@ -1,0 +1,129 @@
+//! The stages that a scene asks for, in their order, on a film's composite.
+
+use super::EncodedImage;
+use super::antialias::antialias;
+use super::cartoon::cartoon;
+use super::noise::{NoiseInput, NoiseStage};
+use super::own_variance::own_variance;
+use crate::film::{Film, Picture, QUOTIENT_EPSILON};
+use crate::gpu::{GpuError, GpuStages};
+use crate::scene::{Composite, NoiseMethod, NoiseSettings, Scene};
+
+/// A finished picture and what the user should hear about it.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    pub picture: Picture,
+    pub notes: Vec<String>,
+}
+
+/// Applies the scene's stages to the composite `picture` of `film`, as frame number `frame` of a video. Without a stage the picture
+/// comes back as it is, and nothing is computed. They run on `gpu` if there is one and it can; else on the CPU.
+pub fn finish(
+    mut picture: Picture,
+    film: &Film,
+    scene: &Scene,
+    frame: u32,
+    gpu: Option<&GpuStages>,
+) -> Finished {
+    let stages = &scene.stages;
+    let mut notes = Vec::new();
+    if let Some(settings) = &stages.cartoon {
+        let image = EncodedImage::from_picture(&picture);
+        let done = on_gpu(gpu, &mut notes, |gpu| gpu.cartoon(&image, settings, false));
+        let result = done.unwrap_or_else(|| cartoon(&image, settings, false));
+        picture = result.image.to_picture();
+    }
+    if let Some(settings) = &stages.antialias {
+        let mask = mask(film);
+        let done = on_gpu(gpu, &mut notes, |gpu| {
+            gpu.antialias(&mut picture, &mask, settings)
+        });
+        if !done.unwrap_or_else(|| antialias(&mut picture, &mask, settings)) {
+            notes.push("[antialias] is off: the film's borders are smooth already".to_owned());
+        }
+    }
+    if let Some(settings) = &stages.noise {
+        let stage = NoiseStage::new(settings, scene.settings.seed);
+        let mask = mask(film);
+        let mut input = NoiseInput {
+            photo: scene.photo.as_ref().map(|photo| photo.linear.as_slice()),
+            mask: Some(&mask),
+            ..NoiseInput::default()
+        };
+        if scene.photo.is_none() {
+            // Nothing was photographed: the whole picture lacks noise.
+            input.mask = None;
+        }
+        let ratio = ratio(film, scene.settings.composite);
+        input.ratio = ratio.as_deref();
+        let variance = match settings.method {
+            NoiseMethod::Missing => Some(own_variance(
+                film,
+                &picture,
+                scene.photo.as_ref(),
+                scene.settings.sampler,
+                smallest_sigma(settings),
+            )),
+            NoiseMethod::Textures => None,
+        };
+        input.variance = variance.as_deref();
+        let done = on_gpu(gpu, &mut notes, |gpu| {
+            gpu.noise(&stage, &mut picture, &input, frame)
+        });
+        if done.is_none() {
+            stage.apply(&mut picture, &input, frame);
+        }
+    }
+    Finished { picture, notes }
+}
+
+/// What `run` gives on the GPU; None without one, or where it cannot, which is noted.
+fn on_gpu<T>(
+    gpu: Option<&GpuStages>,
+    notes: &mut Vec<String>,
+    run: impl FnOnce(&GpuStages) -> Result<T, GpuError>,
+) -> Option<T> {
+    match run(gpu?) {
+        Ok(done) => Some(done),
+        Err(error) => {
+            notes.push(format!(
+                "a stage runs on the CPU, for the GPU cannot: {error}"
+            ));
+            None
+        }
+    }
+}
+
+/// M of each pixel.
+fn mask(film: &Film) -> Vec<f32> {
+    film.pixels
+        .iter()
+        .map(|sums| sums.m as f32 / sums.n.max(1) as f32)
+        .collect()
+}
+
+/// What the quotient composite multiplied the photograph with; None for the additive one, which leaves it as it is.
+fn ratio(film: &Film, composite: Composite) -> Option<Vec<[f32; 3]>> {
+    if composite == Composite::Additive {
+        return None;
+    }
+    let ratios = film.pixels.iter().map(|sums| {
+        if sums.n == 0 || sums.n_real == 0 {
+            return [1.0; 3];
+        }
+        let difference = sums.diff.value() / f64::from(sums.n);
+        let real = sums.r_ir.value() / f64::from(sums.n_real);
+        let ratio = difference / real.max(glam::DVec3::splat(QUOTIENT_EPSILON));
+        (ratio + glam::DVec3::ONE)
+            .max(glam::DVec3::ZERO)
+            .as_vec3()
+            .to_array()
+    });
+    Some(ratios.collect())
+}
+
+/// DN, over bins and channels.
+fn smallest_sigma(settings: &NoiseSettings) -> f32 {
+    let sigmas = settings.profile.bins.iter().flat_map(|bin| bin.sigma);
+    sigmas.fold(f64::INFINITY, f64::min) as f32
+}

@@ -1,0 +1,16 @@
+//! Camera stages: what a camera does to a picture after the composite, or what replaces it.
+//!
+//! Order: composite, boundary antialiasing, noise, response and quantisation; or composite, cartoon. A stage knows no ray: it
+//! works on the film of a render and on images of other programs alike.
+
+pub mod antialias;
+pub mod calibration;
+pub mod cartoon;
+pub mod curve;
+mod encoded;
+mod finish;
+pub mod noise;
+mod own_variance;
+
+pub use encoded::EncodedImage;
+pub use finish::{Finished, finish};

@@ -1,0 +1,292 @@
+//! The commands for pictures of other programs: what they write, and what they refuse.
+
+use super::support::{Folder, Rng, open, spread};
+
+fn noisy(folder: &Folder, name: &str, level: f64, sigma: f64, seed: u64) {
+    let mut rng = Rng(seed);
+    let values: Vec<u8> = (0..3 * 64 * 48)
+        .map(|_| (level + sigma * rng.normal()).round().clamp(0.0, 255.0) as u8)
+        .collect();
+    folder.save(name, 64, 48, |x, y| {
+        let i = 3 * (y * 64 + x) as usize;
+        [values[i], values[i + 1], values[i + 2]]
+    });
+}
+
+fn layers(folder: &Folder) {
+    noisy(folder, "photo.png", 100.0, 3.0, 1);
+    folder.save("layer.png", 64, 48, |_, _| [180; 3]);
+    folder.save("mask.png", 64, 48, |x, _| [if x < 32 { 0 } else { 255 }; 3]);
+}
+
+#[test]
+fn calibrate_writes_a_profile_that_apply_uses() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("scene")).unwrap();
+    for f in 0..6 {
+        noisy(&folder, &format!("scene/{f}.png"), 140.0, 3.0, 100 + f);
+    }
+    let said = folder.done(&[
+        "noise",
+        "calibrate",
+        "scene",
+        "-o",
+        "noise.toml",
+        "--report",
+        "page.html",
+    ]);
+    assert!(
+        said.contains("noise.toml") && said.contains("page.html"),
+        "{said}"
+    );
+    assert!(
+        std::fs::read_to_string(folder.path("page.html"))
+            .unwrap()
+            .contains("<svg")
+    );
+    layers(&folder);
+    let apply = |out: &str, more: &[&str]| {
+        let mut arguments = vec![
+            "noise",
+            "apply",
+            "photo.png",
+            "layer.png",
+            "mask.png",
+            "--profile",
+            "noise.toml",
+            "-o",
+            out,
+        ];
+        arguments.extend(more);
+        folder.done(&arguments);
+        open(&folder.path(out))
+    };
+    let photo = open(&folder.path("photo.png"));
+    let (a, b) = (apply("a.png", &[]), apply("b.png", &["--frame", "1"]));
+    assert_eq!(a, apply("a2.png", &["--frame", "0"]), "reproducible");
+    for x in 0..32 {
+        assert!(
+            (0..48).all(|y| a.get_pixel(x, y) == photo.get_pixel(x, y)),
+            "the photograph stays"
+        );
+    }
+    let level = |picture: &image::RgbImage| {
+        let values: Vec<f64> = (40..64)
+            .flat_map(|x| (0..48).map(move |y| (x, y)))
+            .map(|(x, y)| f64::from(picture.get_pixel(x, y).0[1]))
+            .collect();
+        spread(&values)
+    };
+    assert!((level(&a) - 3.0).abs() < 0.3, "{}", level(&a));
+    assert_ne!(a, b, "frames differ");
+    for more in [
+        &["--paper"][..],
+        &[
+            "--method",
+            "textures",
+            "--texture-size",
+            "64",
+            "--magnification",
+            "2",
+            "--update-delay",
+            "2",
+        ],
+    ] {
+        let picture = apply("c.png", more);
+        assert!(
+            (level(&picture) - 3.0).abs() < 0.4,
+            "{more:?} {}",
+            level(&picture)
+        );
+    }
+    assert!(
+        level(&apply("d.png", &["--scale", "0"])) < 0.01,
+        "control: no noise"
+    );
+}
+
+#[test]
+fn depth_and_masks_say_what_is_virtual() {
+    let folder = Folder::new();
+    layers(&folder);
+    // Nearer than the far limit (white): the right half.
+    folder.save("depth.png", 64, 48, |x, _| {
+        [if x < 32 { 255 } else { 120 }; 3]
+    });
+    let run = |out: &str, mask: &str, more: &[&str]| {
+        let mut arguments = vec!["antialias", "photo.png", "layer.png", mask, "-o", out];
+        arguments.extend(more);
+        folder.done(&arguments);
+        open(&folder.path(out))
+    };
+    let by_mask = run("a.png", "mask.png", &[]);
+    assert_eq!(by_mask, run("b.png", "depth.png", &["--depth"]));
+    assert_eq!(by_mask.get_pixel(40, 20).0, [180; 3]);
+    assert_ne!(
+        by_mask.get_pixel(32, 20).0,
+        [180; 3],
+        "the border is blended"
+    );
+    assert_eq!(
+        run("c.png", "mask.png", &["--beta", "0"])
+            .get_pixel(32, 20)
+            .0,
+        [180; 3],
+        "control"
+    );
+    folder.save("soft.png", 64, 48, |x, _| [(4 * x) as u8; 3]);
+    let output = folder.run(&[
+        "antialias",
+        "photo.png",
+        "layer.png",
+        "soft.png",
+        "-o",
+        "d.png",
+    ]);
+    assert_eq!(output.status.code(), Some(0));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("soft already"));
+}
+
+#[test]
+fn presets_are_given_by_hand() {
+    let folder = Folder::new();
+    folder.done(&[
+        "noise",
+        "calibrate",
+        "--from",
+        "0.02,0.5",
+        "-o",
+        "n.toml",
+        "--bins",
+        "8",
+    ]);
+    let profile = mixray::scene::NoiseProfile::read(&folder.path("n.toml")).unwrap();
+    assert_eq!(profile.bins.len(), 8);
+    let expected = (0.02f64 * 16.0 + 0.5).sqrt();
+    assert!((profile.bins[0].sigma[1] - expected).abs() < 1e-5);
+}
+
+#[test]
+fn the_cartoon_writes_picture_and_edges() {
+    let folder = Folder::new();
+    folder.save("in.png", 64, 48, |x, y| {
+        if (20..40).contains(&x) && (10..30).contains(&y) {
+            [200, 40, 30]
+        } else {
+            [90, 120, 150]
+        }
+    });
+    let said = folder.done(&[
+        "cartoon",
+        "in.png",
+        "out.png",
+        "--edges",
+        "edges.png",
+        "--shrunk",
+        "32x24",
+    ]);
+    assert!(said.contains("out.png"), "{said}");
+    let (picture, edges) = (
+        open(&folder.path("out.png")),
+        open(&folder.path("edges.png")),
+    );
+    assert_eq!(picture.dimensions(), (64, 48));
+    assert_eq!(edges.dimensions(), (192, 48));
+    let dark = picture
+        .pixels()
+        .filter(|p| p.0.iter().all(|c| *c < 80))
+        .count();
+    assert!(dark > 40, "{dark}");
+    folder.done(&["cartoon", "in.png", "flow.png", "--style", "flow"]);
+    assert_ne!(open(&folder.path("flow.png")), picture, "control");
+    folder.done(&["cartoon", "out.png", "out.exr", "--iterations", "0"]);
+}
+
+#[test]
+fn what_cannot_be_used_is_refused() {
+    let folder = Folder::new();
+    layers(&folder);
+    std::fs::create_dir(folder.path("empty")).unwrap();
+    folder.refused(
+        &["noise", "calibrate", "empty", "-o", "n.toml"],
+        "no pictures",
+    );
+    folder.refused(
+        &["noise", "calibrate", "photo.png", "-o", "n.toml"],
+        "one frame only",
+    );
+    folder.refused(
+        &[
+            "noise",
+            "calibrate",
+            "none.png",
+            "other.png",
+            "-o",
+            "n.toml",
+        ],
+        "none.png",
+    );
+    folder.save("small.png", 8, 8, |_, _| [9; 3]);
+    folder.refused(
+        &[
+            "noise",
+            "calibrate",
+            "photo.png",
+            "small.png",
+            "-o",
+            "n.toml",
+        ],
+        "one size",
+    );
+    folder.refused(
+        &[
+            "antialias",
+            "photo.png",
+            "small.png",
+            "mask.png",
+            "-o",
+            "o.png",
+        ],
+        "expected one size",
+    );
+    folder.done(&["noise", "calibrate", "--from", "0,1", "-o", "n.toml"]);
+    let text = std::fs::read_to_string(folder.path("n.toml")).unwrap();
+    folder.write("later.toml", &text.replace("version = 1", "version = 9"));
+    let apply = |profile| {
+        [
+            "noise",
+            "apply",
+            "photo.png",
+            "layer.png",
+            "mask.png",
+            "--profile",
+            profile,
+            "-o",
+            "o.png",
+        ]
+    };
+    folder.refused(&apply("later.toml"), "version 9; expected version 1");
+    folder.refused(&apply("photo.png"), "photo.png");
+    folder.refused(&["cartoon", "n.toml", "o.png"], "format is not known");
+    assert!(!folder.path("o.png").exists());
+    folder.done(&apply("n.toml"));
+    assert!(folder.path("o.png").exists(), "control");
+    for bad in [["--bins", "3"], ["--bins", "0"]] {
+        assert_eq!(
+            folder
+                .run(&[
+                    "noise",
+                    "calibrate",
+                    "--from",
+                    "0,1",
+                    "-o",
+                    "n.toml",
+                    bad[0],
+                    bad[1]
+                ])
+                .status
+                .code(),
+            Some(2)
+        );
+    }
+}
