@@ -4,7 +4,10 @@
 use std::path::{Path, PathBuf};
 
 use mixray::renderer::{Budget, Renderer, RendererOptions};
-use mixray::scene::{self, BackendChoice, Exposure, Overrides, Scene, Side};
+use mixray::scene::{
+    self, AntialiasSettings, BackendChoice, CartoonSettings, Exposure, NoiseFit, NoiseProfile,
+    NoiseSettings, Overrides, Scene, Side,
+};
 
 fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -52,7 +55,9 @@ fn the_readmes_scene_file_loads() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
     let (_, after) = readme.split_once("```toml\n").unwrap();
-    let (text, _) = after.split_once("```").unwrap();
+    let (text, after) = after.split_once("```").unwrap();
+    let (_, after) = after.split_once("```toml\n").unwrap();
+    let (cartoon, _) = after.split_once("```").unwrap();
     let folder = tempfile::tempdir().unwrap();
     let demo = root.join("scenes/demo");
     for (from, to) in [
@@ -62,10 +67,21 @@ fn the_readmes_scene_file_loads() {
     ] {
         std::fs::copy(demo.join(from), folder.path().join(to)).unwrap();
     }
+    let noise = NoiseProfile::from_fit(NoiseFit { a: 0.02, b: 0.5 }, 4);
+    let noise_path = folder.path().join("noise.toml");
+    std::fs::write(&noise_path, noise.to_toml()).unwrap();
+    let noise = NoiseProfile::read(&noise_path).unwrap();
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).unwrap();
     let scene = scene::load(&path).unwrap();
     assert_eq!((scene.objects.len(), scene.lights.len()), (2, 1));
+    // What the README shows of the stages are their defaults.
+    assert_eq!(scene.stages.noise, Some(NoiseSettings::new(noise)));
+    assert_eq!(scene.stages.antialias, Some(AntialiasSettings::default()));
+    let camera = "[camera]\nwidth = 4\nheight = 3\nvertical_fov_deg = 45\n";
+    std::fs::write(&path, format!("{camera}{cartoon}")).unwrap();
+    let stages = scene::load(&path).unwrap().stages;
+    assert_eq!(stages.cartoon, Some(CartoonSettings::default()));
 }
 
 #[test]
