@@ -33,3 +33,4 @@ pub mod packed;
 pub mod renderer;
 pub mod report;
 pub mod scene;
+pub mod stress;

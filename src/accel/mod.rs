@@ -24,8 +24,6 @@ mod wide;
 #[cfg(test)]
 mod gpu_tests;
 #[cfg(test)]
-mod test_support;
-#[cfg(test)]
 mod tests;
 
 use glam::Vec3;

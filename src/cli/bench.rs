@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::render::choice;
-use super::{Failure, Outcome, interrupt, print, progress, say};
+use super::{Failure, Outcome, interrupt, print, progress, say, stress};
 use crate::output::{write_bytes, write_text};
 use crate::renderer::Skip;
 use crate::report::{
@@ -27,7 +27,7 @@ use crate::scene::{
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Scene files
-    #[arg(required_unless_present_any = ["paper_table", "report"])]
+    #[arg(required_unless_present_any = ["paper_table", "report", "stress"])]
     scenes: Vec<PathBuf>,
     /// Folder to write
     #[arg(short, long, value_name = "DIR", default_value = "bench")]
@@ -84,6 +84,10 @@ pub(super) struct Arguments {
     /// The frame rates of Kan and Kaufmann 2012, Table 1, and ours on a scene like theirs
     #[arg(long, conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate"])]
     paper_table: bool,
+    /// Numerical stability: a table of hard cases, each with the figure that it must hold against closed forms and f64 brute force; minutes.
+    /// Writes stress.json, .csv and .md; exits with 1 if a case fails
+    #[arg(long, conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate", "report", "paper_table", "write_docs"])]
+    stress: bool,
     /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->) and <!-- end -->
     #[arg(long, value_name = "FILE")]
     write_docs: Option<PathBuf>,
@@ -239,6 +243,9 @@ impl Docs {
 }
 
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
+    if job.arguments.stress {
+        return stress::run(&job.arguments.output, &job.machine, &command_line());
+    }
     if job.arguments.paper_table {
         return paper_table(&job);
     }

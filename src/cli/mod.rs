@@ -10,6 +10,7 @@ mod interrupt;
 mod merge;
 mod progress;
 mod render;
+mod stress;
 mod summary;
 
 use std::io::Write;
