@@ -27,7 +27,9 @@ pub(super) fn run(folder: &Path, machine: &Machine, command: &str) -> Result<Out
         controls: Vec::new(),
     };
     let settings = |backend: &Backend| -> usize {
-        let of = cases.iter().map(|c| c.settings(backend, Effort::Full).len());
+        let of = cases
+            .iter()
+            .map(|c| c.settings(backend, Effort::Full).len());
         of.sum()
     };
     let total = cases.len() + backends.iter().map(settings).sum::<usize>();

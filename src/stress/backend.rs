@@ -73,9 +73,19 @@ impl Backend {
     /// All rays of a scene. The difference is evaluated at every sample, so that what is drawn at random is the place on pixel and lens alone
     /// where the scene's materials and lights leave nothing else to chance.
     pub(super) fn render(&mut self, scene: &Scene) -> Result<Shown, StressError> {
+        self.render_samples(scene, (0, scene.settings.rays_per_pixel))
+    }
+
+    /// Each pixel's samples from the first number to before the second.
+    pub(super) fn render_samples(
+        &mut self,
+        scene: &Scene,
+        samples: (u32, u32),
+    ) -> Result<Shown, StressError> {
         let mut scene = scene.clone();
         scene.settings.backend = BackendChoice::Cpu;
         let options = RendererOptions {
+            sample_range: Some(samples),
             without: [Skip::Turns].into_iter().collect(),
             ..RendererOptions::default()
         };
@@ -85,7 +95,7 @@ impl Backend {
                 renderer.advance(Budget::Complete, &|| false, &mut |_| ())?;
                 renderer.film().clone()
             }
-            Self::Gpu(gpu) => gpu.film(&renderer)?,
+            Self::Gpu(gpu) => gpu.film(&renderer, samples)?,
         };
         let scene = renderer.scene();
         let picture = composite(&film, scene.photo.as_ref(), scene.settings.composite);
@@ -130,7 +140,7 @@ impl Backend {
 }
 
 impl Gpu {
-    fn film(&mut self, renderer: &Renderer) -> Result<Film, GpuError> {
+    fn film(&mut self, renderer: &Renderer, (first, end): (u32, u32)) -> Result<Film, GpuError> {
         let packed = renderer.packed();
         let features = Features::for_scene(packed);
         let known = self.compiled.iter().position(|(f, _)| *f == features);
@@ -145,8 +155,7 @@ impl Gpu {
                 self.compiled.len() - 1
             }
         };
-        let mut film = Film::new(packed.frame.width, packed.frame.height, 0, false);
-        let end = packed.frame.rays_total;
+        let mut film = Film::new(packed.frame.width, packed.frame.height, first, false);
         for pass in [Pass::Main { end }, Pass::Real { everywhere: false }] {
             self.compiled[at].1.render_pass(
                 packed,

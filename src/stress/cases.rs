@@ -7,7 +7,8 @@ const ORACLE: &str = "f64 brute-force renderer, same samples";
 const PICTURE: &str = "relative difference of the picture + difference of the mask";
 const WRONG_HITS: &str = "hits that differ beyond rounding";
 
-/// A decision that rounding turns weighs one sample: 5e-5 of a quick picture, 6e-6 of a full one. The rest of a picture agrees to 1e-5.
+/// Rounding alone leaves 1e-6. What comes on top is meant: within 1e-5 of its distance from the camera, virtual geometry counts as touching
+/// real geometry, so that one sample in 1e5 beside a contact is shadowed for the oracle's light; it weighs up to 6e-4 of a quick picture.
 const PICTURE_BOUND: f64 = 1e-3;
 
 const fn picture(name: &'static str, what: &'static str) -> Case {
@@ -121,7 +122,7 @@ pub fn cases() -> Vec<Case> {
             control_at: 1.0,
             oracle: "quadrature of the texel in f64",
             quantity: "relative error of the sunlit and of the shadowed part",
-            bound: 0.02,
+            bound: 1e-3,
             run: light::one_pixel_sun,
             ..picture("one-pixel sun", "a sky of one bright texel")
         },
@@ -132,7 +133,7 @@ pub fn cases() -> Vec<Case> {
             control_at: 1.0,
             oracle: "albedo L (r/d)^2 cos",
             quantity: "relative error of the shadow under an even sky",
-            bound: 0.01,
+            bound: 5e-3,
             run: light::form_factor,
             ..picture("black ball", "a black ball over a plane, scaled and moved")
         },
@@ -209,10 +210,13 @@ pub fn cases() -> Vec<Case> {
             quick_settings: &[1e-3, 1e-6],
             control_at: 1e-3,
             run: traversal::grazing_rays,
-            ..rays("grazing rays", "rays that graze a tilted sheet of triangles")
+            ..rays(
+                "grazing rays",
+                "rays that graze a tilted sheet of triangles",
+            )
         },
         Case {
-            unit: "worlds with geometry",
+            unit: "(0 empty, 1 real)",
             settings: &[0.0, 1.0],
             quick_settings: &[0.0, 1.0],
             control_at: 1.0,
@@ -241,6 +245,8 @@ pub fn cases() -> Vec<Case> {
             unit: "triangles",
             settings: &[2.0, 1e5],
             quick_settings: &[1e5],
+            // Each ray asks all of them, and Mesa's software device ends an invocation's loops after 65,535 rounds in all.
+            slow_settings: Some([&[1e4], &[2.0, 1e4]]),
             control_at: 2.0,
             run: pictures::identical,
             ..picture("identical triangles", "as many at one place")

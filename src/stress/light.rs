@@ -1,6 +1,7 @@
 //! Light and sums against closed forms.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{DMat4, DVec3};
@@ -8,15 +9,15 @@ use glam::{DMat4, DVec3};
 use super::backend::{Backend, StressError};
 use super::scenes::{camera, contact, glowing, matt, named, object, place, scene, square};
 use super::{At, Effort, Measured};
-use crate::film::PixelSums;
 use crate::scene::shape::sphere;
-use crate::scene::{
-    EncodedPhoto, Environment, EnvironmentMap, Photo, Scene, Side,
-};
+use crate::scene::{EncodedPhoto, Environment, EnvironmentMap, Photo, Scene, Side};
 
 fn mean_of(pixels: impl Iterator<Item = [f32; 3]>) -> f64 {
     let (sum, count) = pixels.fold((0.0, 0.0), |(sum, count), p| {
-        (sum + p.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0, count + 1.0)
+        (
+            sum + p.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0,
+            count + 1.0,
+        )
     });
     sum / count
 }
@@ -58,19 +59,25 @@ fn sun_irradiance() -> f64 {
 
 const SUNNY_ALBEDO: f32 = 0.5;
 
-/// Left half: a real table in the full shadow of a virtual screen. Right half: a virtual sheet in the full sun.
+/// Left: a real table in the full shadow of a virtual screen. Right half: a virtual sheet in the full sun.
 fn sunny(radiance: f64, rays_per_pixel: u32) -> Scene {
     let camera = camera([16, 8], 16.0, DVec3::Y * 2.0, DVec3::ZERO, -DVec3::Z);
     let gray = matt([SUNNY_ALBEDO; 3]);
     let sun = sun_direction();
-    let above = DVec3::new(-0.5, 0.0, 0.0) + sun * 6.0;
+    let above = DVec3::new(-0.625, 0.0, 0.0) + sun * 6.0;
     let across = DMat4::from_translation(above)
         * DMat4::from_quat(glam::DQuat::from_rotation_arc(DVec3::Y, sun));
     let mut scene = scene(
         camera,
         rays_per_pixel,
         vec![
-            object(Side::Real, "table", square(4.0), gray.clone(), DMat4::IDENTITY),
+            object(
+                Side::Real,
+                "table",
+                square(4.0),
+                gray.clone(),
+                DMat4::IDENTITY,
+            ),
             object(
                 Side::Virtual,
                 "sheet",
@@ -78,7 +85,7 @@ fn sunny(radiance: f64, rays_per_pixel: u32) -> Scene {
                 gray,
                 place(DVec3::new(0.5, 0.002, 0.0), 0.0),
             ),
-            object(Side::Virtual, "screen", square(0.75), matt([0.0; 3]), across),
+            object(Side::Virtual, "screen", square(0.3), matt([0.0; 3]), across),
         ],
     );
     let mut texels = vec![[0.0; 3]; (SKY_WIDTH * SKY_HEIGHT) as usize];
@@ -104,17 +111,17 @@ pub(super) fn one_pixel_sun(backend: &mut Backend, at: At) -> Result<Measured, S
     let brighter = if at.control { 1.1 } else { 1.0 };
     let shown = backend.render(&sunny(at.value * brighter, rays))?;
     let lit = f64::from(SUNNY_ALBEDO) / PI * sun_irradiance() * at.value;
-    // The sheet covers half a metre either side of its middle at 8 pixels a metre.
-    let mean = |columns: std::ops::Range<usize>| {
+    // 8 pixels are a metre; the shadow's edges and the sheet's are left out.
+    let mean = |columns: Range<usize>, rows: Range<usize>| {
         let pixels = shown.picture.linear.iter().enumerate();
         mean_of(
             pixels
-                .filter(|(i, _)| columns.contains(&(i % 16)) && (2..6).contains(&(i / 16)))
+                .filter(|(i, _)| columns.contains(&(i % 16)) && rows.contains(&(i / 16)))
                 .map(|(_, value)| *value),
         )
     };
-    let sheet = mean(9..15) / lit - 1.0;
-    let shadow = mean(2..6) / -lit - 1.0;
+    let sheet = mean(9..15, 2..6) / lit - 1.0;
+    let shadow = mean(2..4, 3..5) / -lit - 1.0;
     Ok(Measured {
         figure: sheet.abs().max(shadow.abs()),
         ..Measured::of_film(&shown.film)
@@ -122,26 +129,20 @@ pub(super) fn one_pixel_sun(backend: &mut Backend, at: At) -> Result<Measured, S
 }
 
 /// A black ball over a matt plane under an even sky: the relative error of what it takes, over the whole picture. Control: the ball a
-/// twentieth lower.
+/// fiftieth larger.
 pub(super) fn form_factor(backend: &mut Backend, at: At) -> Result<Measured, StressError> {
     const SIDE: u32 = 16;
     const FOCAL_PX: f64 = 20.0;
     const ALBEDO: f64 = 0.6;
     let (height, radius, eye) = (0.55, 0.25, 3.0);
-    let camera = camera(
-        [SIDE; 2],
-        FOCAL_PX,
-        DVec3::Y * eye,
-        DVec3::ZERO,
-        -DVec3::Z,
-    );
+    let camera = camera([SIDE; 2], FOCAL_PX, DVec3::Y * eye, DVec3::ZERO, -DVec3::Z);
     let rays = match at.effort {
         Effort::Quick => 256,
         Effort::Full => 4096,
     };
-    let lower = if at.control { 0.95 } else { 1.0 };
-    let ball = DMat4::from_translation(DVec3::Y * height * lower)
-        * DMat4::from_scale(DVec3::splat(radius));
+    let larger = if at.control { 1.02 } else { 1.0 };
+    let ball = DMat4::from_translation(DVec3::Y * height)
+        * DMat4::from_scale(DVec3::splat(radius * larger));
     let mut scene = scene(
         camera,
         rays,
@@ -181,8 +182,8 @@ pub(super) fn form_factor(backend: &mut Backend, at: At) -> Result<Measured, Str
             );
             let d2 = x * x + z * z + height * height;
             // -albedo L (r/d)^2 cos
-            should -= ALBEDO * radius * radius / d2 * (height / d2.sqrt())
-                / f64::from(POINTS * POINTS);
+            should -=
+                ALBEDO * radius * radius / d2 * (height / d2.sqrt()) / f64::from(POINTS * POINTS);
         }
     }
     Ok(Measured {
@@ -247,7 +248,8 @@ pub(super) fn nothing_virtual(backend: &mut Backend, at: At) -> Result<Measured,
     })
 }
 
-/// A surface that glows beyond what a sum can hold: samples that are neither counted as unusable, nor named so that they can be taken again.
+/// A surface that glows beyond what a sum can hold: samples not counted as unusable, one more if the first is not named so that it can be taken
+/// again, one more if the picture is not finite.
 /// Control: it glows as others do.
 pub(super) fn counted_samples(backend: &mut Backend, at: At) -> Result<Measured, StressError> {
     let mut scene = contact(at.effort);
@@ -257,14 +259,18 @@ pub(super) fn counted_samples(backend: &mut Backend, at: At) -> Result<Measured,
         material.emissive = [strength; 3];
         object.instances[0].material = Arc::new(material);
     }
-    // Its light falls on the others too; here only what the camera sees of it counts.
+    // Alone, so that it lights nothing but the camera.
     scene.objects.retain(|object| object.name == "tilted box");
     scene.lights.clear();
     let shown = backend.render(&scene)?;
     let seen: u64 = shown.film.pixels.iter().map(|p| u64::from(p.m)).sum();
     let counted = shown.film.non_finite_samples();
+    // What is named makes it again: that sample alone.
     let named = match shown.film.first_non_finite() {
-        Some((pixel, sample)) => is_unusable_again(&shown.film.pixels[pixel], sample),
+        Some((pixel, sample)) => {
+            let again = backend.render_samples(&scene, (sample, sample + 1))?;
+            again.film.pixels[pixel].non_finite == 1
+        }
         None => false,
     };
     let finite = shown
@@ -275,9 +281,4 @@ pub(super) fn counted_samples(backend: &mut Backend, at: At) -> Result<Measured,
     Ok(Measured::figure(
         seen.abs_diff(counted) as f64 + f64::from(u8::from(!named)) + f64::from(u8::from(!finite)),
     ))
-}
-
-/// The named sample is one of the pixel's own.
-fn is_unusable_again(sums: &PixelSums, sample: u32) -> bool {
-    sums.non_finite > 0 && sample < sums.n
 }

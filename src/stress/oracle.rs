@@ -171,7 +171,9 @@ impl World {
         };
         match look {
             Look::Unlit(color) => *color,
-            Look::Lambert(albedo) => *albedo * self.irradiance(position, normal, index, worlds) / PI,
+            Look::Lambert(albedo) => {
+                *albedo * self.irradiance(position, normal, index, worlds) / PI
+            }
             Look::Mirror(f0) => {
                 // Schlick, as glTF has it.
                 let schlick = *f0 + (DVec3::ONE - *f0) * (1.0 - cos).powi(5);

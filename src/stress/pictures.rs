@@ -6,8 +6,8 @@ use super::backend::{Backend, Shown, StressError};
 use super::meshes::{Random, fan_of_slivers};
 use super::oracle::{Expected, expected};
 use super::scenes::{
-    camera, clear, contact, glowing, matt, mirror, named, object, place, placed, point_light, scene,
-    size, square, triangle,
+    camera, clear, contact, glowing, matt, mirror, named, object, place, placed, point_light,
+    scene, size, square, triangle,
 };
 use super::{At, Measured};
 use crate::scene::shape::{cuboid, quad};
@@ -24,9 +24,9 @@ fn difference(shown: &Shown, expected: &Expected) -> Measured {
         let covered = f64::from(sums.m) / f64::from(sums.n.max(1));
         mask += (covered - expected.mask[pixel]).abs();
     }
-    let relative = if whole > 0.0 { error / whole } else { error };
     Measured {
-        figure: relative + mask / shown.film.pixels.len() as f64,
+        // Not a number, and so beyond any bound, where nothing should show: such a scene would prove nothing.
+        figure: error / whole + mask / shown.film.pixels.len() as f64,
         ..Measured::of_film(&shown.film)
     }
 }
@@ -98,7 +98,7 @@ pub(super) fn outlier(backend: &mut Backend, at: At) -> Result<Measured, StressE
     // Over the table's far edge, so that the outliers are seen.
     let lifted = |scene: &Scene| {
         let mut scene = scene.clone();
-        scene.camera.cy -= 0.25 * f64::from(scene.camera.height);
+        scene.camera.cy += 0.3 * f64::from(scene.camera.height);
         scene
     };
     let rendered = placed(&lifted(&with_outliers), at.value, DVec3::ZERO);
@@ -217,7 +217,7 @@ pub(super) fn grazing(backend: &mut Backend, at: At) -> Result<Measured, StressE
                 ),
             ],
         );
-        scene.lights = vec![point_light(DVec3::new(-1.0, 1.5, -2.0), 12.0)];
+        scene.lights = vec![point_light(DVec3::new(1.0, 1.5, -2.0), 12.0)];
         scene
     };
     let lowered = if at.control { 0.15 * angle } else { 0.0 };
@@ -239,6 +239,8 @@ pub(super) fn aperture(backend: &mut Backend, at: At) -> Result<Measured, Stress
 pub(super) fn focus(backend: &mut Backend, at: At) -> Result<Measured, StressError> {
     let mut scene = contact(at.effort);
     scene.lens.focus_distance_m = at.value;
+    // Near focus with a wide lens would blur everything away.
+    scene.lens.aperture_radius_m = (0.1 * at.value).min(0.02);
     let mut should_show = scene.clone();
     if at.control {
         let focus = &mut should_show.lens.focus_distance_m;
@@ -262,13 +264,7 @@ pub(super) fn roughness(backend: &mut Backend, at: At) -> Result<Measured, Stres
             (card, glowing(color))
         };
         let mut objects = vec![
-            object(
-                Side::Real,
-                "floor",
-                square(2.0),
-                mirror(),
-                DMat4::IDENTITY,
-            ),
+            object(Side::Real, "floor", square(2.0), mirror(), DMat4::IDENTITY),
             object(
                 Side::Virtual,
                 "box",
@@ -401,6 +397,12 @@ pub(super) fn identical(backend: &mut Backend, at: At) -> Result<Measured, Stres
 pub(super) fn nothing_real(backend: &mut Backend, at: At) -> Result<Measured, StressError> {
     let scene = contact(at.effort);
     let mut without = scene.clone();
-    without.objects.retain(|object| object.side == Side::Virtual);
-    against(backend, &without, if at.control { &scene } else { &without })
+    without
+        .objects
+        .retain(|object| object.side == Side::Virtual);
+    against(
+        backend,
+        &without,
+        if at.control { &scene } else { &without },
+    )
 }

@@ -191,8 +191,8 @@ pub(super) fn grazing_rays(backend: &mut Backend, at: At) -> Result<Measured, St
     let mut triangles = Vec::new();
     for i in 0..side {
         for j in 0..side {
-            let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
-                .map(|(i, j)| corner(i, j));
+            let [a, b, c, d] =
+                [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| corner(i, j));
             triangles.extend([[a, c, b], [a, d, c]]);
         }
     }
