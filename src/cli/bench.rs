@@ -86,9 +86,9 @@ pub(super) struct Arguments {
     paper_table: bool,
     /// Numerical stability: a table of hard cases, each with the figure that it must hold against closed forms and f64 brute force; minutes.
     /// Writes stress.json, .csv and .md; exits with 1 if a case fails
-    #[arg(long, conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate", "report", "paper_table", "write_docs"])]
+    #[arg(long, conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate", "report", "paper_table"])]
     stress: bool,
-    /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->) and <!-- end -->
+    /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->, <!-- stress -->) and <!-- end -->
     #[arg(long, value_name = "FILE")]
     write_docs: Option<PathBuf>,
     /// CPU threads [default: all]
@@ -127,10 +127,14 @@ impl Arguments {
             let message = "--reference is of one scene, and so must be the scenes";
             return Err(Failure(message.to_owned()));
         }
-        let section = match (self.paper_table, self.ablate) {
-            (true, _) => "paper-table",
-            (false, true) => "ablate",
-            (false, false) => "bench",
+        let section = if self.stress {
+            "stress"
+        } else if self.paper_table {
+            "paper-table"
+        } else if self.ablate {
+            "ablate"
+        } else {
+            "bench"
         };
         let docs = self
             .write_docs
@@ -244,7 +248,11 @@ impl Docs {
 
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     if job.arguments.stress {
-        return stress::run(&job.arguments.output, &job.machine, &command_line());
+        let (outcome, table) = stress::run(&job.arguments.output, &job.machine, &command_line())?;
+        if let Some(docs) = &job.docs {
+            docs.write(&table)?;
+        }
+        return Ok(outcome);
     }
     if job.arguments.paper_table {
         return paper_table(&job);

@@ -9,8 +9,12 @@ use crate::output::write_text;
 use crate::report::Machine;
 use crate::stress::{Backend, Effort, Report, cases, csv, markdown, text};
 
-/// On the CPU, and on the machine's graphics adapter if it names one.
-pub(super) fn run(folder: &Path, machine: &Machine, command: &str) -> Result<Outcome, Failure> {
+/// On the CPU, and on the machine's graphics adapter if it names one. Gives the table as Markdown too.
+pub(super) fn run(
+    folder: &Path,
+    machine: &Machine,
+    command: &str,
+) -> Result<(Outcome, String), Failure> {
     let mut backends = vec![Backend::Cpu];
     if machine.gpu.is_some() {
         backends.push(Backend::gpu(Arc::new(GpuDevice::open(AdapterChoice::Any)?)));
@@ -54,13 +58,14 @@ pub(super) fn run(folder: &Path, machine: &Machine, command: &str) -> Result<Out
     json.push('\n');
     write_text(&folder.join("stress.json"), &json)?;
     write_text(&folder.join("stress.csv"), &csv(&report))?;
-    write_text(&folder.join("stress.md"), &markdown(&report, &cases))?;
+    let table = markdown(&report, &cases);
+    write_text(&folder.join("stress.md"), &table)?;
     print(&text(&report));
     if interrupted.is_set() {
-        return Ok(Outcome::Interrupted);
+        return Ok((Outcome::Interrupted, table));
     }
     if report.passed() {
-        return Ok(Outcome::Done);
+        return Ok((Outcome::Done, table));
     }
     let failed = report.figures.iter().filter(|figure| !figure.passed);
     let names: Vec<String> = failed
@@ -74,5 +79,5 @@ pub(super) fn run(folder: &Path, machine: &Machine, command: &str) -> Result<Out
         )
         .collect();
     say("check failed", &names.join("; "));
-    Ok(Outcome::CheckFailed)
+    Ok((Outcome::CheckFailed, table))
 }

@@ -278,7 +278,9 @@ pub(super) fn counted_samples(backend: &mut Backend, at: At) -> Result<Measured,
         .linear
         .iter()
         .all(|p| p.iter().all(|c| c.is_finite()));
-    Ok(Measured::figure(
-        seen.abs_diff(counted) as f64 + f64::from(u8::from(!named)) + f64::from(u8::from(!finite)),
-    ))
+    let missing = seen.abs_diff(counted) + u64::from(!named) + u64::from(!finite);
+    Ok(Measured {
+        figure: missing as f64,
+        ..Measured::of_film(&shown.film)
+    })
 }

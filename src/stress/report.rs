@@ -95,7 +95,7 @@ fn summary(report: &Report) -> String {
         for figure in report.figures.iter().filter(|f| f.non_finite_samples > 0) {
             let _ = writeln!(
                 out,
-                "{} at {} on {}: {} samples not finite, the first at {}",
+                "- {} at {} on {}: {} samples not finite, the first at {}",
                 figure.case,
                 figure.setting,
                 figure.backend,
@@ -133,26 +133,49 @@ pub fn text(report: &Report) -> String {
     )
 }
 
-/// The same as Markdown, with what each case is.
+/// As Markdown: what each case is, its settings, and the worst of its figures on each backend.
 pub fn markdown(report: &Report, cases: &[Case]) -> String {
     let mut out = format!("    {}\n\n{}\n\n", report.command, machine(report));
-    let _ = writeln!(out, "| {} |", HEADS.join(" | "));
-    let _ = writeln!(out, "|{}", " --- |".repeat(HEADS.len()));
-    for row in rows(report) {
-        let _ = writeln!(out, "| {} |", row.join(" | "));
-    }
-    let _ = write!(
-        out,
-        "\n{}\n| case | what | against | figure |\n| --- | --- | --- | --- |\n",
-        summary(report)
-    );
+    out += "| case | settings | figure | against | CPU | GPU | bound | control |\n";
+    let _ = writeln!(out, "|{}", " --- |".repeat(8));
     for case in cases {
+        let of_case: Vec<&Figure> = report
+            .figures
+            .iter()
+            .filter(|figure| figure.case == case.name)
+            .collect();
+        let mut settings: Vec<&str> = Vec::new();
+        for figure in &of_case {
+            if !settings.contains(&figure.setting.as_str()) {
+                settings.push(&figure.setting);
+            }
+        }
+        let worst = |backend: &str| {
+            let figures = of_case.iter().filter(|f| f.backend == backend);
+            figures
+                // A figure that is not a number is the worst of all.
+                .max_by(|a, b| a.measured.total_cmp(&b.measured))
+                .map_or("-".to_owned(), |f| {
+                    let verdict = if f.passed { "" } else { " **fails**" };
+                    format!("{}{verdict}", number(f.measured))
+                })
+        };
+        let control = report.controls.iter().find(|c| c.case == case.name);
         let _ = writeln!(
             out,
-            "| {} | {} | {} | {} |",
-            case.name, case.what, case.oracle, case.quantity
+            "| {}: {} | {} | {} | {} | {} | {} | {} | {} |",
+            case.name,
+            case.what,
+            settings.join(", "),
+            case.quantity,
+            case.oracle,
+            worst("cpu"),
+            worst("gpu"),
+            number(case.bound),
+            control.map_or("-".to_owned(), |c| number(c.measured)),
         );
     }
+    let _ = write!(out, "\n{}", summary(report));
     out
 }
 
