@@ -6,13 +6,15 @@ import package::bindings::{
     MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT
 };
 @if(photo_albedo) import package::lens::camera_project;
-import package::math::dot3;
+import package::math::{cross3, dot3, safe_sqrt};
 import package::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
 import package::texture::{slot, slot_rgb, texture_sample};
 import package::trace::Hit;
 
 const GAMMA_7: f32 = 4.172327e-7;
 const BARYCENTRIC_ERROR: f32 = 1.1920929e-7;
+const PLANE_ERROR: f32 = 2.3841858e-7;
+const SLIMMEST: f32 = 1e-4;
 const PHOTO_DEPTH_TOLERANCE: f32 = 0.02;
 
 struct Surface {
@@ -149,6 +151,19 @@ fn perturbed(map: u32, scale: f32, normal: vec3<f32>, v0: Vertex, v1: Vertex, v2
     return mapped_normal(normal, tangent, texel.xyz, scale);
 }
 
+fn plane_error(e1: vec3<f32>, e2: vec3<f32>) -> f32 {
+    let a1 = abs(e1);
+    let a2 = abs(e2);
+    let length = max(max(max(a1.x, a1.y), a1.z), max(max(a2.x, a2.y), a2.z));
+    if length <= 1e-36 {
+        return 0.0;
+    }
+    let inv = 1.0 / length;
+    let n = cross3(e1 * inv, e2 * inv);
+    let slimness = max(safe_sqrt(dot3(n, n)), SLIMMEST);
+    return PLANE_ERROR * length / slimness;
+}
+
 fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
     let triangle = triangles[hit.triangle];
     let entry = materials[triangle.material];
@@ -162,8 +177,9 @@ fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
     let position = blend3(b, p0, p1, p2);
     let a0 = abs(p0);
     let magnitude = blend3(abs(b), a0, abs(p1), abs(p2));
-    let error = GAMMA_7 * (magnitude.x + magnitude.y + magnitude.z)
+    let position_error = GAMMA_7 * (magnitude.x + magnitude.y + magnitude.z)
         + BARYCENTRIC_ERROR * (a0.x + a0.y + a0.z);
+    let error = max(position_error, plane_error(p1 - p0, p2 - p0));
 
     let blended = unit(blend3(b, v0.normal_v0.xyz, v1.normal_v0.xyz, v2.normal_v0.xyz));
     let outward = triangle_normal(p1 - p0, p2 - p0, blended);

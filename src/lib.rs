@@ -34,3 +34,4 @@ pub mod renderer;
 pub mod report;
 pub mod scene;
 pub mod stages;
+pub mod stress;

@@ -1,54 +1,16 @@
 //! The shader's hits against the CPU's.
 
-use bytemuck::Zeroable;
 use glam::Vec3;
 
-use super::test_support::*;
 use super::{Hit, Ray, WorldBvh};
-use crate::gpu::{
-    Features, SceneBuffers, SceneParts,
-    harness::{Probe, test_device},
-};
-use crate::packed::{Frame, NONE};
+use crate::gpu::harness::test_device;
+use crate::packed::NONE;
+use crate::stress::backend::traced_by_shader;
+use crate::stress::meshes::*;
 
 /// Hits in (real, virtual) worlds as the shader finds them; `None` without a device.
 fn shader_hits(worlds: [&WorldBvh; 2], rays: &[(Ray, u32)], any_hit: bool) -> Option<Vec<Hit>> {
-    let gpu = test_device()?;
-    let parts = SceneParts {
-        frame: Frame::zeroed(),
-        bvh_nodes: worlds.map(|world| world.gpu_nodes().as_flattened()),
-        bvh_leaves: worlds.map(WorldBvh::gpu_leaves),
-        ..SceneParts::default()
-    };
-    let scene = SceneBuffers::from_parts(gpu, &parts).expect("uploads");
-    let body = format!(
-        "let ray = Ray(input_vec3(0u), input_f32(3u), input_vec3(4u), input_f32(7u), input(8u));
-         let hit = trace(ray, input(9u), {any_hit}, probe_record % 64u);
-         output_f32(0u, hit.t); output_f32(1u, hit.u); output_f32(2u, hit.v); output(3u, hit.triangle);"
-    );
-    let probe = Probe {
-        features: Features::default(),
-        prelude: "import package::trace::{trace, Ray, Hit};",
-        body: &body,
-        input_words: 10,
-        output_words: 4,
-        scene: Some(&scene),
-    };
-    let mut inputs = Vec::new();
-    for (ray, world) in rays {
-        let [ox, oy, oz] = ray.origin.to_array();
-        let [dx, dy, dz] = ray.direction.to_array();
-        inputs.extend([ox, oy, oz, ray.t_min, dx, dy, dz, ray.t_max].map(f32::to_bits));
-        inputs.extend([ray.skip, *world]);
-    }
-    let outputs = probe.run(gpu, &inputs).expect("runs");
-    let hits = outputs.chunks_exact(4).map(|words| Hit {
-        t: f32::from_bits(words[0]),
-        u: f32::from_bits(words[1]),
-        v: f32::from_bits(words[2]),
-        triangle: words[3],
-    });
-    Some(hits.collect())
+    Some(traced_by_shader(test_device()?, worlds, rays, any_hit).expect("runs"))
 }
 
 /// How many ids differ, and the largest relative difference of distances where they agree.

@@ -26,8 +26,6 @@ mod wide;
 #[cfg(test)]
 mod gpu_tests;
 #[cfg(test)]
-mod test_support;
-#[cfg(test)]
 mod tests;
 
 use glam::Vec3;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::render::choice;
-use super::{Failure, Outcome, interrupt, print, progress, say};
+use super::{Failure, Outcome, interrupt, print, progress, say, stress};
 use crate::output::{write_bytes, write_text};
 use crate::renderer::Skip;
 use crate::report::{
@@ -27,7 +27,7 @@ use crate::scene::{
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Scene files
-    #[arg(required_unless_present_any = ["paper_table", "report"])]
+    #[arg(required_unless_present_any = ["paper_table", "report", "stress"])]
     scenes: Vec<PathBuf>,
     /// Folder to write
     #[arg(short, long, value_name = "DIR", default_value = "bench")]
@@ -84,7 +84,11 @@ pub(super) struct Arguments {
     /// The frame rates of Kan and Kaufmann 2012, Table 1, and ours on a scene like theirs
     #[arg(long, conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate"])]
     paper_table: bool,
-    /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->) and <!-- end -->
+    /// Numerical stability: a table of hard cases, each with the figure that it must hold against closed forms and f64 brute force; minutes.
+    /// Writes stress.json, .csv and .md; exits with 1 if a case fails
+    #[arg(long, conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate", "report", "paper_table"])]
+    stress: bool,
+    /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->, <!-- stress -->) and <!-- end -->
     #[arg(long, value_name = "FILE")]
     write_docs: Option<PathBuf>,
     /// CPU threads [default: all]
@@ -123,10 +127,14 @@ impl Arguments {
             let message = "--reference is of one scene, and so must be the scenes";
             return Err(Failure(message.to_owned()));
         }
-        let section = match (self.paper_table, self.ablate) {
-            (true, _) => "paper-table",
-            (false, true) => "ablate",
-            (false, false) => "bench",
+        let section = if self.stress {
+            "stress"
+        } else if self.paper_table {
+            "paper-table"
+        } else if self.ablate {
+            "ablate"
+        } else {
+            "bench"
         };
         let docs = self
             .write_docs
@@ -239,6 +247,13 @@ impl Docs {
 }
 
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
+    if job.arguments.stress {
+        let (outcome, table) = stress::run(&job.arguments.output, &job.machine, &command_line())?;
+        if let Some(docs) = &job.docs {
+            docs.write(&table)?;
+        }
+        return Ok(outcome);
+    }
     if job.arguments.paper_table {
         return paper_table(&job);
     }

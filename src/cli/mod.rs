@@ -15,6 +15,7 @@ mod noise;
 mod progress;
 mod render;
 mod stage_device;
+mod stress;
 mod summary;
 
 use std::io::Write;

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use crate::accel::Hit;
 use crate::camera::lens::camera_project;
+use crate::math::{cross3, dot3, safe_sqrt};
 use crate::packed::{
     MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
     MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, Material, NONE,
@@ -17,6 +18,10 @@ use super::texture::{slot, slot_rgb, texture_sample};
 const GAMMA_7: f32 = 4.172_327e-7;
 /// Bound on the absolute error of 1 - u - v for barycentrics in 0..1: two roundings of numbers of at most 1.
 const BARYCENTRIC_ERROR: f32 = 1.192_092_9e-7;
+/// A triangle's weights are differences of products of two of its lengths, and four roundings of 2^-24 each.
+const PLANE_ERROR: f32 = 2.384_185_8e-7;
+/// Triangles slimmer than this (width over length) count as no slimmer: rays would leave them from too far off.
+const SLIMMEST: f32 = 1e-4;
 /// Relative difference up to which a depth in `photo_albedo` is the point's own.
 const PHOTO_DEPTH_TOLERANCE: f32 = 0.02;
 
@@ -25,7 +30,8 @@ const PHOTO_DEPTH_TOLERANCE: f32 = 0.02;
 pub struct Surface {
     /// Anchor-relative, metres.
     pub position: Vec3,
-    /// Bound on the distance of `position` from the exact point of the triangle, metres.
+    /// Bound on the distance of `position` from the exact point of the triangle, and on that at which a ray from there may meet the triangle
+    /// again, metres.
     pub error: f32,
     /// Unit geometric normal on the side that the ray came from.
     pub ng: Vec3,
@@ -199,6 +205,21 @@ fn perturbed(
     mapped_normal(normal, tangent, sample.truncate(), scale)
 }
 
+/// How far from its plane the tracer may find the triangle of these edges for a ray that starts near it: a sliver's weights, and with them the
+/// distance along the ray, are only as good as it is wide.
+fn plane_error(e1: Vec3, e2: Vec3) -> f32 {
+    let a1 = e1.abs();
+    let a2 = e2.abs();
+    let length = a1.x.max(a1.y).max(a1.z).max(a2.x.max(a2.y).max(a2.z));
+    if length <= 1e-36 {
+        return 0.0;
+    }
+    let inv = 1.0 / length;
+    let n = cross3(e1 * inv, e2 * inv);
+    let slimness = safe_sqrt(dot3(n, n)).max(SLIMMEST);
+    PLANE_ERROR * length / slimness
+}
+
 /// The shading point of a hit (not a miss) by a ray of unit direction `ray_direction`.
 pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface {
     let triangle = &scene.triangles[hit.triangle as usize];
@@ -213,11 +234,12 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
     let position = blend3(b, p0, p1, p2);
     let a0 = p0.abs();
     let magnitude = blend3(b.abs(), a0, p1.abs(), p2.abs());
-    let error = GAMMA_7 * (magnitude.x + magnitude.y + magnitude.z)
+    let position_error = GAMMA_7 * (magnitude.x + magnitude.y + magnitude.z)
         + BARYCENTRIC_ERROR * (a0.x + a0.y + a0.z);
 
     let e1 = p1 - p0;
     let e2 = p2 - p0;
+    let error = position_error.max(plane_error(e1, e2));
     let blended = unit(blend3(
         b,
         vertex_normal(v0),

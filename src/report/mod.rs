@@ -16,7 +16,7 @@ mod plot;
 mod record;
 mod reference;
 mod shrink;
-mod table;
+pub(crate) mod table;
 
 pub use against::{Change, Verdict, against};
 pub use docs::replace_section;

@@ -184,7 +184,7 @@ fn remarks(report: &Report) -> Vec<String> {
 }
 
 /// Columns by spaces: the first two to the left, numbers to the right.
-pub(super) fn aligned(cells: &[Vec<String>]) -> String {
+pub(crate) fn aligned(cells: &[Vec<String>]) -> String {
     let columns = cells.iter().map(Vec::len).max().unwrap_or(0);
     let width_of = |column: usize| {
         let lengths = cells.iter().filter_map(|row| row.get(column));
@@ -292,7 +292,7 @@ pub fn csv(report: &Report) -> String {
 }
 
 /// RFC 4180.
-fn escaped(value: &str) -> String {
+pub(crate) fn escaped(value: &str) -> String {
     if value.contains([',', '"', '\n']) {
         format!("\"{}\"", value.replace('"', "\"\""))
     } else {

@@ -19,7 +19,7 @@ mod pose;
 mod reader;
 mod scan;
 mod settings;
-mod shape;
+pub(crate) mod shape;
 pub mod smooth;
 pub mod srgb;
 mod stages;

@@ -71,7 +71,7 @@ fn push_vertex(primitive: &mut Primitive, position: DVec3, normal: DVec3, uv: [f
 }
 
 /// Unit radius, about the origin, poles on Y, smooth normals; `segments` around, half as many from pole to pole.
-fn sphere(segments: u32) -> Primitive {
+pub(crate) fn sphere(segments: u32) -> Primitive {
     let mut primitive = named("sphere");
     let rings = segments / 2;
     let columns = segments + 1;
@@ -118,14 +118,14 @@ fn push_quad(primitive: &mut Primitive, corner: DVec3, edge_u: DVec3, edge_v: DV
 }
 
 /// Faces the side of edge_u x edge_v.
-fn quad(corner: DVec3, edge_u: DVec3, edge_v: DVec3) -> Primitive {
+pub(crate) fn quad(corner: DVec3, edge_u: DVec3, edge_v: DVec3) -> Primitive {
     let mut primitive = named("quad");
     push_quad(&mut primitive, corner, edge_u, edge_v);
     primitive
 }
 
 /// About the origin, flat faces outward.
-fn cuboid(size: DVec3) -> Primitive {
+pub(crate) fn cuboid(size: DVec3) -> Primitive {
     let mut primitive = named("box");
     let axes = [DVec3::X, DVec3::Y, DVec3::Z];
     for axis in 0..3 {

@@ -3,8 +3,9 @@
 
 use std::sync::Arc;
 
-use glam::{DMat4, DVec3};
-use mixray::scene::{BackendChoice, Environment, EnvironmentMap, LightKind, Primitive, Scene};
+use glam::DVec3;
+use mixray::scene::{BackendChoice, Environment, EnvironmentMap, Primitive, Scene};
+use mixray::stress::{fan_of_slivers, placed};
 
 use crate::support::*;
 
@@ -35,33 +36,6 @@ material = {{ base_color = [0.9, 0.7, 0.5], metallic = 1.0, roughness = 0.4 }}
 "#
     ));
     scene.settings.rays_per_pixel = 32;
-    scene
-}
-
-/// The same picture at another size and place. Point lights would need another intensity; there are none.
-fn placed(scene: &Scene, scale: f64, translation: DVec3) -> Scene {
-    let mut scene = scene.clone();
-    let to = DMat4::from_translation(translation) * DMat4::from_scale(DVec3::splat(scale));
-    for object in &mut scene.objects {
-        object.world_from_object = to * object.world_from_object;
-    }
-    let position = scene.camera.world_from_camera.w_axis.truncate();
-    scene.camera.world_from_camera.w_axis = to.transform_point3(position).extend(1.0);
-    scene.lens.aperture_radius_m *= scale;
-    scene.lens.focus_distance_m *= scale;
-    for light in &mut scene.lights {
-        if let LightKind::Quad {
-            corner,
-            edge_u,
-            edge_v,
-            ..
-        } = &mut light.kind
-        {
-            *corner = to.transform_point3(DVec3::from(*corner)).to_array();
-            *edge_u = (DVec3::from(*edge_u) * scale).to_array();
-            *edge_v = (DVec3::from(*edge_v) * scale).to_array();
-        }
-    }
     scene
 }
 
@@ -105,37 +79,9 @@ fn scale_and_place_do_not_matter(backend: BackendChoice) {
     assert!(rms > 0.03, "control: a lens that did not grow shows: {rms}");
 }
 
-/// A fan from one corner whose triangles narrow from decimetres to tenths of a micrometre.
+/// The table as a fan whose triangles narrow from decimetres to tenths of a micrometre.
 fn sliver_table() -> Primitive {
-    let mut primitive = Primitive {
-        name: "slivers".into(),
-        ..Primitive::default()
-    };
-    let mut push = |x: f64, z: f64| {
-        primitive.positions.push([x as f32, 0.0, z as f32]);
-        primitive.normals.push([0.0, 1.0, 0.0]);
-    };
-    push(-2.0, 2.0);
-    push(2.0, 2.0);
-    // From (2, 2) up the right side to (2, -2), then along the far side, denser and denser towards the middle of each.
-    let narrowing = (1..=60).map(|k| 2.0 * 0.75_f64.powi(k));
-    let offsets: Vec<f64> = narrowing
-        .clone()
-        .map(|d| -d)
-        .chain([0.0])
-        .chain(narrowing.collect::<Vec<_>>().into_iter().rev())
-        .collect();
-    for d in &offsets {
-        push(2.0, -d);
-    }
-    push(2.0, -2.0);
-    for d in offsets.iter().rev() {
-        push(*d, -2.0);
-    }
-    push(-2.0, -2.0);
-    let count = primitive.positions.len() as u32;
-    primitive.triangles = (1..count - 1).map(|i| [0, i, i + 1]).collect();
-    primitive
+    fan_of_slivers(2.0, 3e7)
 }
 
 fn slivers_lose_nothing(backend: BackendChoice) {
