@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::render::choice;
+use super::render::{above_zero, choice};
 use super::{Failure, Outcome, interrupt, print, progress, say};
 use crate::output::{write_bytes, write_text};
 use crate::renderer::Skip;
@@ -90,13 +90,6 @@ pub(super) struct Arguments {
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-}
-
-fn above_zero(text: &str) -> Result<f64, &'static str> {
-    match text.parse::<f64>() {
-        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        _ => Err("expected a number above 0"),
-    }
 }
 
 /// What was asked for, with files that can be read and written.

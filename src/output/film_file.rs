@@ -367,6 +367,7 @@ mod tests {
             seed: 1,
             estimator: Estimator::Paper,
             sampler: SamplerKind::Cmj,
+            scrambles: None,
             camera: Camera {
                 width: 3,
                 height: 2,

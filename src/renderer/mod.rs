@@ -17,22 +17,27 @@
 //! # }
 //! ```
 
+mod adaptive;
 mod control;
+mod goal;
 mod photo_albedo;
 mod skips;
 mod stats;
+mod tiles;
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DMat4;
 
+pub use adaptive::{SCRAMBLES, Stated};
 pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
+pub use goal::{CameraNoise, ErrorGoal};
 pub use skips::{Skip, Without};
 pub use stats::{Stats, StatsRays};
 
 use crate::cpu;
-use crate::film::{Film, MergeError, Picture, Planes, composite, planes};
+use crate::film::{Film, MergeError, Picture, Planes, composite, estimated_error, planes};
 use crate::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError};
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Side};
@@ -88,6 +93,8 @@ pub struct Renderer {
     rays: RayTotals,
     seconds: Seconds,
     notes: Vec<String>,
+    /// The error of a film that [`Renderer::render_to_error`] made.
+    stated: Option<Stated>,
 }
 
 enum Backend {
@@ -126,6 +133,7 @@ impl Renderer {
             rays: RayTotals::default(),
             seconds: Seconds::default(),
             notes: Vec::new(),
+            stated: None,
         };
         renderer.prepare_photo();
         renderer.look_ahead();
@@ -138,6 +146,7 @@ impl Renderer {
 
     /// Runs the pilot and begins the film that follows its plan.
     fn look_ahead(&mut self) {
+        self.stated = None;
         cpu::pilot(&mut self.packed);
         self.options.without.apply(&mut self.packed.pixels);
         self.film = Film::new(
@@ -223,6 +232,9 @@ impl Renderer {
         cancelled: &(dyn Fn() -> bool + Sync),
         progress: &mut dyn FnMut(Progress),
     ) -> Result<(), RenderError> {
+        if self.stated.is_some() {
+            return Ok(());
+        }
         let start = Instant::now();
         let deadline = match budget {
             Budget::Time(time) => Some(start + time),
@@ -441,7 +453,7 @@ impl Renderer {
             .zip(&self.packed.pixels)
             .filter(|(_, info)| info.flags & PIXEL_OUT_OF_REACH == 0);
         within_reach
-            .map(|(sums, info)| sums.n / info.sample_factor)
+            .map(|(sums, _)| sums.n / sums.sample_factor.max(1))
             .min()
             .unwrap_or(self.end_sample - self.film.first_sample)
     }
@@ -467,8 +479,22 @@ impl Renderer {
         )
     }
 
+    /// The variance plane is that of the scrambles where there are any, else that of the samples.
     pub fn planes(&self) -> Planes {
-        planes(&self.film, self.scene.photo.as_ref())
+        let mut planes = planes(&self.film, self.scene.photo.as_ref());
+        if let Some(stated) = &self.stated {
+            planes.variance.clone_from(&stated.variance);
+        }
+        planes
+    }
+
+    /// Root-mean-square error of the picture, linear: from the scrambles where there are any, else from the variance of the samples, which
+    /// overstates that of a stratified sampler.
+    pub fn error(&self) -> f64 {
+        match &self.stated {
+            Some(stated) => stated.rms(),
+            None => estimated_error(&self.film, self.scene.photo.as_ref()),
+        }
     }
 
     pub fn rays(&self) -> RayTotals {
