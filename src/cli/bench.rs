@@ -69,6 +69,9 @@ pub(super) struct Arguments {
     /// Measure `direct` without each of its savings too
     #[arg(long)]
     ablate: bool,
+    /// Measure `direct` with the preview filter too
+    #[arg(long)]
+    filter: bool,
     /// Find the time that each method needs for this RMSE
     #[arg(long, value_name = "X", value_parser = above_zero)]
     target_rmse: Option<f64>,
@@ -180,11 +183,18 @@ impl Arguments {
                             sampler,
                             composite,
                             without: None,
+                            filter: false,
                         };
                         if methods.contains(&method) {
                             continue;
                         }
                         methods.push(method);
+                        if self.filter && estimator == Estimator::Direct {
+                            methods.push(Method {
+                                filter: true,
+                                ..method
+                            });
+                        }
                         if self.ablate && estimator == Estimator::Direct {
                             methods.extend(without_each(method));
                         }

@@ -67,6 +67,9 @@ pub(super) struct Arguments {
     /// The camera's noise, sigma^2 = A y + B in 8-bit code values y of the encoded picture
     #[arg(long, value_name = "A,B", value_parser = camera_noise, requires = "stop_at")]
     camera_noise: Option<CameraNoise>,
+    /// Smooth what virtual objects change on diffuse real surfaces, for previews of a few rays per pixel: biased
+    #[arg(long, conflicts_with = "range")]
+    filter: bool,
     /// Do without a saving, to see what it is worth; may be given several times
     #[arg(long, value_name = "NAME", value_parser = choice::<Skip>())]
     no_skip: Vec<Skip>,
@@ -100,6 +103,7 @@ pub(super) struct Job {
     range: Option<(u32, u32)>,
     without: Without,
     goal: Option<ErrorGoal>,
+    filter: bool,
 }
 
 impl Arguments {
@@ -120,6 +124,7 @@ impl Arguments {
         let goal = self.goal()?;
         Ok(Job {
             goal,
+            filter: self.filter,
             scene: self.scene,
             targets,
             overrides: Overrides {
@@ -188,6 +193,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         all_planes: targets.iter().any(|t| t.format() == Format::Exr),
         sample_range: job.range,
         without: job.without,
+        filter: job.filter,
     };
     let mut renderer = Renderer::new(scene, options)?;
     let interrupted = interrupt::watch()?;

@@ -28,7 +28,11 @@ pub(super) fn text(renderer: &Renderer, stats: &Stats, targets: &[Target]) -> St
             stats.error.rms
         ),
     };
-    out + &lines(stats, &error)
+    out += &lines(stats, &error);
+    if renderer.is_filtered() {
+        out += "filter  the difference on diffuse real surfaces is smoothed, a bias; the error is that before the filter\n";
+    }
+    out
 }
 
 fn from_scrambles(stated: &Stated) -> String {

@@ -3,6 +3,7 @@
 mod accumulation;
 mod compare;
 mod composite;
+mod filter;
 mod flip;
 mod scrambles;
 mod sums;
@@ -10,6 +11,7 @@ mod sums;
 pub use accumulation::{Film, MergeError, PixelCounts, PixelKind};
 pub use compare::{Comparison, SizeMismatch, compare};
 pub use composite::{Picture, Planes, QUOTIENT_EPSILON, composite, estimated_error, planes};
+pub use filter::{RealSurface, filter_difference};
 pub use flip::{flip, flip_map};
 pub use scrambles::{Scrambles, stated_share};
 pub use sums::{

@@ -25,6 +25,8 @@ pub struct Metadata {
     pub camera: Camera,
     /// Independent scrambles that the variance plane is taken from; `None`: it is that of the samples.
     pub scrambles: Option<u32>,
+    /// The preview filter has smoothed the picture.
+    pub filtered: bool,
 }
 
 impl Metadata {
@@ -33,6 +35,7 @@ impl Metadata {
         let scene = renderer.scene();
         Self {
             rays_per_pixel: renderer.samples(),
+            filtered: renderer.is_filtered(),
             scrambles: renderer.stated().map(|stated| stated.scrambles),
             max_bounces: scene.settings.max_bounces,
             seed: scene.settings.seed,
@@ -57,6 +60,11 @@ impl Metadata {
         let camera = &self.camera;
         let rows = camera.world_from_camera.transpose().to_cols_array();
         let distortion = camera.distortion.map(|k| k.to_string()).join(" ");
+        let filter = if self.filtered {
+            "preview: the difference is smoothed, biased"
+        } else {
+            "none"
+        };
         let variance = match self.scrambles {
             Some(count) => format!("of the mean of {count} independent scrambles"),
             None => "of the samples: an upper estimate".to_owned(),
@@ -69,6 +77,7 @@ impl Metadata {
             ("mixray.estimator", text(estimator)),
             ("mixray.sampler", text(sampler)),
             ("mixray.variance", text(&variance)),
+            ("mixray.filter", text(filter)),
             ("mixray.camera.fx", AttributeValue::F64(camera.fx)),
             ("mixray.camera.fy", AttributeValue::F64(camera.fy)),
             ("mixray.camera.cx", AttributeValue::F64(camera.cx)),
@@ -261,6 +270,7 @@ mod tests {
             estimator: Estimator::Direct,
             sampler: SamplerKind::Sobol,
             scrambles: Some(16),
+            filtered: true,
             camera: Camera {
                 width: 3,
                 height: 2,
@@ -326,6 +336,8 @@ mod tests {
         assert_eq!(*attribute("mixray.sampler"), text("sobol"));
         let variance = "of the mean of 16 independent scrambles";
         assert_eq!(*attribute("mixray.variance"), text(variance));
+        let filter = "preview: the difference is smoothed, biased";
+        assert_eq!(*attribute("mixray.filter"), text(filter));
         assert_eq!(
             *attribute("mixray.version"),
             text(env!("CARGO_PKG_VERSION"))
@@ -360,6 +372,7 @@ mod tests {
             estimator: Estimator::Paper,
             sampler: SamplerKind::Cmj,
             scrambles: None,
+            filtered: false,
             camera: Camera {
                 width: 3,
                 height: 2,

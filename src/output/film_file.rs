@@ -368,6 +368,7 @@ mod tests {
             estimator: Estimator::Paper,
             sampler: SamplerKind::Cmj,
             scrambles: None,
+            filtered: false,
             camera: Camera {
                 width: 3,
                 height: 2,

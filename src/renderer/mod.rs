@@ -25,6 +25,7 @@ mod skips;
 mod stats;
 mod tiles;
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -37,7 +38,10 @@ pub use skips::{Skip, Without};
 pub use stats::{Stats, StatsRays};
 
 use crate::cpu;
-use crate::film::{Film, MergeError, Picture, Planes, composite, estimated_error, planes};
+use crate::film::{
+    Film, MergeError, Picture, Planes, RealSurface, composite, estimated_error, filter_difference,
+    planes,
+};
 use crate::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError};
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Side};
@@ -55,6 +59,8 @@ pub struct RendererOptions {
     pub sample_range: Option<(u32, u32)>,
     /// Savings to do without.
     pub without: Without,
+    /// Pictures and planes show the difference on diffuse real surfaces smoothed: for previews, biased. The film is not touched.
+    pub filter: bool,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -95,6 +101,8 @@ pub struct Renderer {
     notes: Vec<String>,
     /// The error of a film that [`Renderer::render_to_error`] made.
     stated: Option<Stated>,
+    /// What the preview filter is guided by; empty where it is off.
+    surfaces: Vec<Option<RealSurface>>,
 }
 
 enum Backend {
@@ -134,6 +142,7 @@ impl Renderer {
             seconds: Seconds::default(),
             notes: Vec::new(),
             stated: None,
+            surfaces: Vec::new(),
         };
         renderer.prepare_photo();
         renderer.look_ahead();
@@ -157,6 +166,23 @@ impl Renderer {
         );
         let factors = self.packed.pixels.iter().map(|p| p.sample_factor);
         self.film.set_sample_factors(factors);
+        if self.options.filter {
+            self.surfaces = cpu::diffuse_surfaces(&self.packed);
+        }
+    }
+
+    /// The film as pictures show it.
+    fn shown(&self) -> Cow<'_, Film> {
+        if self.options.filter {
+            Cow::Owned(filter_difference(&self.film, &self.surfaces))
+        } else {
+            Cow::Borrowed(&self.film)
+        }
+    }
+
+    /// Whether the preview filter is on.
+    pub fn is_filtered(&self) -> bool {
+        self.options.filter
     }
 
     fn open_backend(&mut self) -> Result<Backend, RenderError> {
@@ -298,7 +324,7 @@ impl Renderer {
         let options = RendererOptions {
             all_planes: !film.guides.is_empty(),
             sample_range: Some((film.first_sample, scene.settings.rays_per_pixel)),
-            without: Without::default(),
+            ..RendererOptions::default()
         };
         let mut renderer = Self::new(scene, options)?;
         renderer.film = film;
@@ -473,7 +499,7 @@ impl Renderer {
     /// The film composited over the photograph.
     pub fn picture(&self) -> Picture {
         composite(
-            &self.film,
+            &self.shown(),
             self.scene.photo.as_ref(),
             self.scene.settings.composite,
         )
@@ -481,7 +507,7 @@ impl Renderer {
 
     /// The variance plane is that of the scrambles where there are any, else that of the samples.
     pub fn planes(&self) -> Planes {
-        let mut planes = planes(&self.film, self.scene.photo.as_ref());
+        let mut planes = planes(&self.shown(), self.scene.photo.as_ref());
         if let Some(stated) = &self.stated {
             planes.variance.clone_from(&stated.variance);
         }
