@@ -86,7 +86,7 @@ impl Backend {
         scene.settings.backend = BackendChoice::Cpu;
         let options = RendererOptions {
             sample_range: Some(samples),
-            without: [Skip::Turns].into_iter().collect(),
+            without: [Skip::Plan].into_iter().collect(),
             ..RendererOptions::default()
         };
         let mut renderer = Renderer::new(scene, options)?;

@@ -9,7 +9,7 @@ use super::Effort;
 use crate::scene::shape::{cuboid, quad};
 use crate::scene::{
     Aperture, BackendChoice, Camera, Composite, Estimator, Exposure, Instance, Lens, Light,
-    LightKind, Material, Object, Primitive, SamplerKind, Scene, Settings, Side,
+    LightKind, Material, Object, Primitive, SamplerKind, Scene, Settings, Side, Stages,
 };
 
 /// A scene of these objects, seen by a pinhole, one interaction before the light.
@@ -17,6 +17,8 @@ pub(super) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -
     Scene {
         name: "stress".to_owned(),
         path: PathBuf::new(),
+        inputs: Vec::new(),
+        stages: Stages::default(),
         photo: None,
         camera,
         lens: Lens {
