@@ -94,6 +94,8 @@ struct Z {
     sum: f64,
     squares: f64,
     beyond_3: f64,
+    /// Largest |z|, its estimate and its truth.
+    worst: (f64, f32, f32),
 }
 
 impl Z {
@@ -106,6 +108,9 @@ impl Z {
                 self.count += 1.0;
                 self.sum += z;
                 self.squares += z * z;
+                if z.abs() > self.worst.0 {
+                    self.worst = (z.abs(), *x, *truth);
+                }
                 self.beyond_3 += f64::from(u8::from(z.abs() > 3.0));
             }
         }
@@ -159,6 +164,11 @@ fn honest(root: &Path) -> Result<String, Failure> {
                 sampled.variance(),
             );
             eprintln!("{}", table.lines().last().unwrap_or_default());
+            let worst = stated.worst;
+            eprintln!(
+                "largest |z| {:.1}: {} instead of {}",
+                worst.0, worst.1, worst.2
+            );
         }
     }
     Ok(table)

@@ -11,6 +11,11 @@ use super::composite::{Means, QUOTIENT_EPSILON};
 use super::{Film, GuideSums, PixelSums};
 use crate::scene::{Composite, Photo};
 
+/// Pixels to either side whose spread a pixel's own is moderated with.
+const NEAR: usize = 2;
+/// Degrees of freedom that the neighbours' spread counts as.
+const NEIGHBOURS: f64 = 15.0;
+
 /// What the composite of one channel is made of, scramble by scramble.
 const TERMS: usize = 4;
 
@@ -58,11 +63,12 @@ struct Moments {
     count: u32,
 }
 
-/// Stated variance of the mean of `count` scrambles over the variance of one: 1 / S, times (S - 1) / (S - 3), which is the variance of
-/// Student's t with S - 1 degrees of freedom, so that (estimate - truth) / stated error has variance 1 although the spread itself is an estimate.
+/// Stated variance of the mean of `count` scrambles over the moderated variance of one: 1 / S, times f / (f - 2), which is the variance of
+/// Student's t with f degrees of freedom, so that (estimate - truth) / stated error has variance 1 although the spread itself is an estimate.
 pub fn stated_share(count: u32) -> f64 {
     let count = f64::from(count.max(1));
-    (count - 1.0) / (count - 3.0).max(1.0) / count
+    let freedom = count - 1.0 + NEIGHBOURS;
+    freedom / (freedom - 2.0) / count
 }
 
 /// The sum of scrambles, and their spread in the pixels that something virtual may reach (about 350 bytes each).
@@ -169,16 +175,42 @@ impl Scrambles {
         DVec3::from(squares) / f64::from(moments.count - 1)
     }
 
-    /// Stated variance of the composite of `film`, linear, by channel and pixel: see [`stated_share`]. 0 where no two scrambles differ.
+    /// Stated variance of the composite of `film`, linear, by channel and pixel; 0 where no two scrambles differ, here and nearby.
+    ///
+    /// A pixel's light may be faint in most samples and bright in a few. Where the scrambles met none of the few, their own spread states next to
+    /// no error. It is moderated by the mean spread of the pixels of the same kind within two pixels (as G. K. Smyth, "Linear models and
+    /// empirical Bayes methods", 2004, does with genes): both count by their degrees of freedom.
     pub fn stated_variances(&self, photo: Option<&Photo>) -> Vec<[f32; 3]> {
-        let mut out = vec![[0.0; 3]; self.film.pixels.len()];
-        let stated: Vec<(usize, DVec3)> = self.variances_of_one(photo).collect();
-        for ((pixel, variance), moments) in stated.into_iter().zip(&self.moments) {
-            out[pixel] = (variance * stated_share(moments.count))
-                .as_vec3()
-                .to_array();
+        let (width, height) = (self.film.width as usize, self.film.height as usize);
+        let mut own = vec![None; self.film.pixels.len()];
+        let of_one: Vec<(usize, DVec3)> = self.variances_of_one(photo).collect();
+        for ((pixel, variance), moments) in of_one.into_iter().zip(&self.moments) {
+            own[pixel] = (moments.count > 1).then_some((variance, moments.count));
         }
-        out
+        let stated = |(pixel, own_here): (usize, &Option<(DVec3, u32)>)| {
+            let Some((variance, count)) = *own_here else {
+                return [0.0; 3];
+            };
+            let kind = self.film.kind(pixel);
+            let (x, y) = (pixel % width, pixel / width);
+            let (mut sum, mut pixels) = (DVec3::ZERO, 0.0);
+            for near_y in y.saturating_sub(NEAR)..(y + NEAR + 1).min(height) {
+                for near_x in x.saturating_sub(NEAR)..(x + NEAR + 1).min(width) {
+                    let near = near_y * width + near_x;
+                    if let Some((variance, _)) = own[near]
+                        && self.film.kind(near) == kind
+                    {
+                        sum += variance;
+                        pixels += 1.0;
+                    }
+                }
+            }
+            let freedom = f64::from(count - 1);
+            let moderated =
+                (variance * freedom + sum / pixels * NEIGHBOURS) / (freedom + NEIGHBOURS);
+            (moderated * stated_share(count)).as_vec3().to_array()
+        };
+        own.par_iter().enumerate().map(stated).collect()
     }
 }
 
@@ -275,7 +307,7 @@ mod tests {
             const RENDERS: u32 = 3000;
             for render in 0..RENDERS {
                 let mean = mean_of(render * 16, 16, mode);
-                let students = 15.0 / 13.0;
+                let students = 30.0 / 28.0;
                 stated += f64::from(mean.stated_variances(Some(&photo))[0][0]) / students;
                 let channel = &mean.moments[0].channels[0];
                 let weights = gradient(&channel.mean, mode, f64::from(IC));

@@ -20,8 +20,8 @@ pub const SCRAMBLES: u32 = 16;
 const TRIAL_SCRAMBLES: u32 = 4;
 /// The second trial takes this share of the samples that the first calls for: it tells how fast the error really falls.
 const SECOND_TRIAL_SHARE: f64 = 0.25;
-/// A difference is evaluated at one sample in this many at the least: each pixel is expected to see it twice.
-const LONGEST_PERIOD: f64 = 8.0;
+/// A difference is evaluated at one sample in this many at the least: each pixel is expected to see it four times.
+const LONGEST_PERIOD: f64 = 4.0;
 /// Least gain: a pixel takes one sample a scramble anyway.
 const LEAST_GAIN: f64 = 1.0 / 16.0;
 /// Keeps the scrambles' seeds apart from those that a user gives.
@@ -369,7 +369,7 @@ mod tests {
         assert_eq!(scale(plan(3, 6), 1.0, 99), plan(3, 6));
         assert_eq!(scale(plan(3, 6), 5.0, 99), plan(15, 6));
         assert_eq!(scale(plan(1, 1), 0.25, 99), plan(1, 4));
-        assert_eq!(scale(plan(1, 16), 0.1, 99), plan(1, 8), "never seldomer");
+        assert_eq!(scale(plan(1, 16), 0.1, 99), plan(1, 4), "never seldomer");
         assert_eq!(scale(plan(4, 1), 100.0, 64).sample_factor, 64);
     }
 }
