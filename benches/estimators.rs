@@ -175,7 +175,7 @@ fn measure(
         };
         scene.settings.rays_per_pixel = rays_per_pixel;
         scene.settings.seed = seed;
-        let lens = scene.lens.clone();
+        let lens = scene.lens;
         let mut renderer = Renderer::new(scene, RendererOptions::default())?;
         let start = thread_cpu_secs();
         if estimator == Estimator::Direct {

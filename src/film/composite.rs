@@ -92,18 +92,17 @@ pub fn composite_pixel(sums: &PixelSums, ic: [f32; 3], mode: Composite) -> [f32;
     value.as_vec3().to_array()
 }
 
-/// Means over the samples of a pixel.
-pub(super) struct Means {
-    pub mask: f64,
-    pub m_im: DVec3,
-    pub diff: DVec3,
+struct Means {
+    mask: f64,
+    m_im: DVec3,
+    diff: DVec3,
     /// 0 where no real sample was taken.
-    pub m_ir: DVec3,
-    pub r_ir: DVec3,
+    m_ir: DVec3,
+    r_ir: DVec3,
 }
 
 impl Means {
-    pub fn of(sums: &PixelSums) -> Self {
+    fn of(sums: &PixelSums) -> Self {
         let n = f64::from(sums.n.max(1));
         let n_real = f64::from(sums.n_real.max(1));
         Self {

@@ -10,5 +10,4 @@ mod lens;
 mod perfect_proxy;
 mod photograph;
 mod repeatability;
-mod stated_error;
 mod support;
