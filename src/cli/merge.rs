@@ -30,6 +30,9 @@ pub(super) struct Arguments {
     /// Bits a channel of PNG pictures [default: 16 for a 16-bit photograph, else 8]
     #[arg(long, value_parser = PossibleValuesParser::new(["8", "16"]).map(png_bits))]
     png_bits: Option<PngBits>,
+    /// Frame number of a video: with [noise], every frame has its own
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    frame: u32,
 }
 
 struct Part<'a> {
@@ -65,7 +68,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let total = first.note.total;
     let renderer = Renderer::with_film(scene, film)?;
     let complete = range == (0, total);
-    write(&renderer, &targets, arguments.png_bits, 0, !complete)?;
+    write(
+        &renderer,
+        &targets,
+        arguments.png_bits,
+        arguments.frame,
+        !complete,
+    )?;
     let mut out = String::new();
     for target in &targets {
         out += &format!(
