@@ -23,19 +23,19 @@ fn stage_antialias(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let value = vec3<f32>(source[3u * here], source[3u * here + 1u], source[3u * here + 2u]);
-    var sum = value;
+    var sum = vec3<f32>(0.0);
     var count = 1.0;
     for (var y = max(id.y, 1u) - 1u; y < min(id.y + 2u, params.height); y++) {
         for (var x = max(id.x, 1u) - 1u; x < min(id.x + 2u, params.width); x++) {
             let near = y * params.width + x;
             if mask[near] == 0.0 {
-                sum += vec3<f32>(source[3u * near], source[3u * near + 1u], source[3u * near + 2u]);
+                sum += vec3<f32>(source[3u * near], source[3u * near + 1u], source[3u * near + 2u]) - value;
                 count += 1.0;
             }
         }
     }
     if count > 1.0 {
-        let blended = value + params.beta * (sum / count - value);
+        let blended = value + params.beta * (sum / count);
         picture[3u * here] = blended.x;
         picture[3u * here + 1u] = blended.y;
         picture[3u * here + 2u] = blended.z;

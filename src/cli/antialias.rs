@@ -7,7 +7,7 @@ use clap::Args;
 use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
 use super::{Failure, Outcome, print, say};
-use crate::output::{Target, write_composite};
+use crate::output::{Target, check_distinct, write_composite};
 use crate::scene::AntialiasSettings;
 use crate::stages::antialias::antialias;
 
@@ -37,6 +37,7 @@ fn unit(text: &str) -> Result<f32, &'static str> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let target = Target::picture(&arguments.output)?;
+    check_distinct(&[&arguments.output], &arguments.layers.paths())?;
     let mut layers = arguments.layers.read()?;
     let settings = AntialiasSettings {
         beta: arguments.beta,
@@ -49,6 +50,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         say("note", "the mask is soft already: nothing is blended");
     }
     write_composite(&target, &layers.picture, &layers.photo, layers.bits())?;
-    print(&format!("picture {}\n", target.path().display()));
+    print(&format!("picture {}\n", target.path().display()))?;
     Ok(Outcome::Done)
 }

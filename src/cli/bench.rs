@@ -97,7 +97,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     write_docs: Option<PathBuf>,
     /// CPU threads [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
 
@@ -157,8 +157,6 @@ impl Arguments {
         let cpu_only = self.backends.as_slice() == [BackendChoice::Cpu];
         let machine = Machine::this(!cpu_only && self.report.is_none());
         let methods = self.methods(machine.gpu.as_ref().is_some_and(|gpu| gpu.hardware));
-        std::fs::create_dir_all(&self.output)
-            .map_err(|error| Failure(format!("{}: {error}", self.output.display())))?;
         Ok(Job {
             arguments: self,
             earlier,
@@ -255,8 +253,11 @@ impl Docs {
 
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     if job.arguments.stress {
+        job.make_folder()?;
         let (outcome, table) = stress::run(&job.arguments.output, &job.machine, &command_line())?;
-        if let Some(docs) = &job.docs {
+        if let Some(docs) = &job.docs
+            && outcome != Outcome::Interrupted
+        {
             docs.write(&table)?;
         }
         return Ok(outcome);
@@ -268,11 +269,19 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         return gpu_times(&job);
     }
     let (report, interrupted) = match &job.arguments.report {
-        Some(path) => (read_report(path)?, false),
+        Some(path) => {
+            let mut report = read_report(path)?;
+            if job.arguments.target_rmse.is_some() {
+                conclude(&mut report, job.arguments.target_rmse);
+            }
+            (report, false)
+        }
         None => benchmark(&job)?,
     };
-    print(&text(&report));
-    if let Some(docs) = &job.docs {
+    print(&text(&report))?;
+    if let Some(docs) = &job.docs
+        && !interrupted
+    {
         docs.write(&markdown(&report))?;
     }
     let regression = match &job.earlier {
@@ -297,6 +306,7 @@ struct Gallery {
 fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
     let arguments = &job.arguments;
     let scenes = load_scenes(arguments, job.hardware_gpu())?;
+    job.make_folder()?;
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
     let plan = job.plan(arguments.rpp.clone());
@@ -361,6 +371,17 @@ impl Job {
             first_seed: self.arguments.seed,
             hardware_gpu: self.hardware_gpu(),
         }
+    }
+
+    /// Makes the folder for what is written, once it is known that something will be.
+    fn make_folder(&self) -> Result<(), Failure> {
+        let folder = &self.arguments.output;
+        std::fs::create_dir_all(folder).map_err(|error| {
+            Failure(format!(
+                "{}: {error}; expected a folder that can be made; give another with -o",
+                folder.display()
+            ))
+        })
     }
 
     fn hardware_gpu(&self) -> bool {
@@ -525,7 +546,7 @@ fn compare(report: &Report, earlier: &Report, tolerance: f64) -> Result<bool, Fa
                 .to_owned(),
         ));
     }
-    print(&comparison(&verdict, tolerance));
+    print(&comparison(&verdict, tolerance))?;
     let regressions: Vec<&str> = verdict
         .changes
         .iter()
@@ -577,6 +598,7 @@ fn comparison(verdict: &Verdict, tolerance: f64) -> String {
 }
 
 fn paper_table(job: &Job) -> Result<Outcome, Failure> {
+    job.make_folder()?;
     let folder = &job.arguments.output;
     let path = folder.join("paper.toml");
     write_text(&path, PAPER_SCENE)?;
@@ -606,8 +628,10 @@ fn paper_table(job: &Job) -> Result<Outcome, Failure> {
     if let Some(shot) = shots.iter().max_by_key(|shot| shot.rays_per_pixel) {
         write_bytes(&folder.join("paper.png"), &picture_png(&shot.picture)?)?;
     }
-    print(&paper_text(&machine, &rows));
-    if let Some(docs) = &job.docs {
+    print(&paper_text(&machine, &rows))?;
+    if let Some(docs) = &job.docs
+        && !cancelled()
+    {
         docs.write(&paper_markdown(&command_line(), &machine, &rows))?;
     }
     Ok(if cancelled() {
@@ -620,6 +644,7 @@ fn paper_table(job: &Job) -> Result<Outcome, Failure> {
 fn gpu_times(job: &Job) -> Result<Outcome, Failure> {
     let interrupted = interrupt::watch()?;
     let scenes = load_scenes(&job.arguments, false)?;
+    job.make_folder()?;
     let steps = progress::Steps::new((scenes.len() * job.arguments.rpp.len()) as u64);
     let mut times = Vec::new();
     'scenes: for scene in &scenes {
@@ -648,8 +673,10 @@ fn gpu_times(job: &Job) -> Result<Outcome, Failure> {
     }))?;
     json.push('\n');
     write_text(&job.arguments.output.join("gpu-time.json"), &json)?;
-    print(&gpu_time_text(&job.machine, &times));
-    if let Some(docs) = &job.docs {
+    print(&gpu_time_text(&job.machine, &times))?;
+    if let Some(docs) = &job.docs
+        && !interrupted.is_set()
+    {
         docs.write(&gpu_time_markdown(&command_line(), &job.machine, &times))?;
     }
     Ok(match interrupted.is_set() {

@@ -30,10 +30,14 @@ fn limit(text: &str) -> Result<f64, &'static str> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let comparison = compare(&read(&arguments.image)?, &read(&arguments.reference)?)?;
+    let (image, reference) = (read(&arguments.image)?, read(&arguments.reference)?);
+    let comparison = compare(&image, &reference).map_err(|problem| {
+        let (a, b) = (arguments.image.display(), arguments.reference.display());
+        Failure(format!("{a}, {b}: {problem}"))
+    })?;
     let mut json = serde_json::to_string_pretty(&comparison)?;
     json.push('\n');
-    print(&json);
+    print(&json)?;
     match arguments.max_rmse {
         Some(limit) if comparison.rmse > limit => {
             say(

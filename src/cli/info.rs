@@ -18,7 +18,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     if arguments.json {
         let mut json = serde_json::to_string_pretty(&adapters)?;
         json.push('\n');
-        print(&json);
+        print(&json)?;
         return Ok(Outcome::Done);
     }
     let mut out = format!(
@@ -32,7 +32,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     if !adapters.iter().any(|a| a.hardware) {
         out += "no hardware GPU: --backend auto renders on the CPU\n";
     }
-    print(&out);
+    print(&out)?;
     Ok(Outcome::Done)
 }
 

@@ -21,8 +21,15 @@ pub(super) struct LayerArguments {
     #[arg(long)]
     depth: bool,
     /// The far limit: white is 1, EXR values are as stored
-    #[arg(long, value_name = "X", default_value_t = 1.0, requires = "depth")]
+    #[arg(long, value_name = "X", default_value_t = 1.0, requires = "depth", value_parser = distance, allow_hyphen_values = true)]
     far: f32,
+}
+
+fn distance(text: &str) -> Result<f32, &'static str> {
+    match text.parse::<f32>() {
+        Ok(x) if !x.is_nan() => Ok(x),
+        _ => Err("expected a number"),
+    }
 }
 
 /// The composite with what it was made from, linear.
@@ -33,6 +40,11 @@ pub(super) struct Layers {
 }
 
 impl LayerArguments {
+    /// The files that are read.
+    pub(super) fn paths(&self) -> [PathBuf; 3] {
+        [self.photo.clone(), self.layer.clone(), self.mask.clone()]
+    }
+
     pub(super) fn read(&self) -> Result<Layers, Failure> {
         let photo = read_photo(&self.photo)?;
         let layer = read_photo(&self.layer)?;

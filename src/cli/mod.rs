@@ -99,14 +99,21 @@ fn read_photo(path: &Path) -> Result<Photo, Failure> {
 
 /// A message to the user, one line.
 fn say(kind: &str, message: &str) {
-    let words: Vec<&str> = message.split_whitespace().collect();
+    let line = message.trim().replace(['\r', '\n', '\t'], " ");
     // Without a stderr there is nobody to tell.
-    let _ = writeln!(std::io::stderr(), "{kind}: {}", words.join(" "));
+    let _ = writeln!(std::io::stderr(), "{kind}: {line}");
 }
 
 /// A result to stdout. A reader that has heard enough (a closed pipe) is no failure.
-fn print(text: &str) {
+fn print(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout();
-    let _ = stdout.write_all(text.as_bytes());
-    let _ = stdout.flush();
+    let written = stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush());
+    match written {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure(format!(
+            "the result cannot be written to standard output: {error}"
+        ))),
+        _ => Ok(()),
+    }
 }

@@ -1,6 +1,6 @@
 //! `mixray noise`: a camera's noise, measured and given to what no camera took.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::builder::PossibleValuesParser;
@@ -9,7 +9,7 @@ use clap::{Args, Subcommand};
 use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
 use super::{Failure, Outcome, print, progress, say};
-use crate::output::{Target, check_writable, write_composite, write_text};
+use crate::output::{Target, check_distinct, check_writable, write_composite, write_text};
 use crate::scene::{Choice, NoiseFit, NoiseMethod, NoiseProfile, NoiseSettings};
 use crate::stages::calibration::{calibrate, group_frames, report_html};
 use crate::stages::noise::{NoiseInput, NoiseStage};
@@ -98,8 +98,8 @@ struct Apply {
     /// Frames that keep the same noise
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     update_delay: u32,
-    /// Textures of 8 bits, all as in the paper
-    #[arg(long)]
+    /// Textures of 8 bits, all as in the paper: implies --method textures
+    #[arg(long, conflicts_with = "method")]
     paper: bool,
     /// The same seed gives the same noise
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -147,13 +147,34 @@ fn run_calibrate(arguments: &Calibrate) -> Result<Outcome, Failure> {
     if let Some(report) = &arguments.report {
         check_writable(report)?;
     }
+    let outputs = [Some(&arguments.output), arguments.report.as_ref()];
+    let outputs: Vec<&Path> = outputs
+        .into_iter()
+        .flatten()
+        .map(PathBuf::as_path)
+        .collect();
+    check_distinct(&outputs, &arguments.frames)?;
     if let Some(fit) = arguments.from {
+        if fit.variance(0.0).max(fit.variance(255.0)) <= 0.0 {
+            return Err(Failure(
+                "--from: the variance is 0 or less at every level; expected A y + B above 0; give larger numbers"
+                    .to_owned(),
+            ));
+        }
         let profile = NoiseProfile::from_fit(fit, arguments.bins);
+        profile
+            .check()
+            .map_err(|problem| Failure(format!("--from: {problem}")))?;
         write_text(&arguments.output, &profile.to_toml())?;
-        print(&summary(&profile, &arguments.output));
+        print(&summary(&profile, &arguments.output))?;
         return Ok(Outcome::Done);
     }
     let scenes = group_frames(&arguments.frames)?;
+    let frames: Vec<PathBuf> = scenes
+        .iter()
+        .flat_map(|scene| scene.paths.clone())
+        .collect();
+    check_distinct(&outputs, &frames)?;
     let bar = progress::Count::new("frames read");
     let result = calibrate(&scenes, arguments.bins, &mut |done, total| {
         bar.show(done, total);
@@ -167,14 +188,14 @@ fn run_calibrate(arguments: &Calibrate) -> Result<Outcome, Failure> {
     if let Some(report) = &arguments.report {
         write_text(report, &report_html(&calibration))?;
     }
-    print(&summary(&calibration.profile, &arguments.output));
+    print(&summary(&calibration.profile, &arguments.output))?;
     if let Some(report) = &arguments.report {
-        print(&format!("report  {}\n", report.display()));
+        print(&format!("report  {}\n", report.display()))?;
     }
     Ok(Outcome::Done)
 }
 
-fn summary(profile: &NoiseProfile, output: &std::path::Path) -> String {
+fn summary(profile: &NoiseProfile, output: &Path) -> String {
     let mut out = format!("profile {}\n", output.display());
     for (index, bin) in profile.bins.iter().enumerate() {
         let count = profile.bins.len();
@@ -210,6 +231,11 @@ fn summary(profile: &NoiseProfile, output: &std::path::Path) -> String {
 
 fn run_apply(arguments: &Apply) -> Result<Outcome, Failure> {
     let target = Target::picture(&arguments.output)?;
+    let [photo, layer, mask] = arguments.layers.paths();
+    check_distinct(
+        &[&arguments.output],
+        &[photo, layer, mask, arguments.profile.clone()],
+    )?;
     let profile = NoiseProfile::read(&arguments.profile)
         .map_err(|problem| Failure(format!("{}: {problem}", arguments.profile.display())))?;
     let method = match arguments.method.as_deref().and_then(NoiseMethod::from_name) {
@@ -226,6 +252,7 @@ fn run_apply(arguments: &Apply) -> Result<Outcome, Failure> {
         eight_bit: arguments.paper,
         ..NoiseSettings::new(profile)
     };
+    settings.check_textures().map_err(Failure)?;
     let mut layers = arguments.layers.read()?;
     let gpu = arguments.device.open()?;
     let start = Instant::now();
@@ -245,6 +272,6 @@ fn run_apply(arguments: &Apply) -> Result<Outcome, Failure> {
         "picture {}\ntime    {:.1} ms for the noise\n",
         target.path().display(),
         1000.0 * seconds
-    ));
+    ))?;
     Ok(Outcome::Done)
 }

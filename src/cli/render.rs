@@ -64,7 +64,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
     /// CPU threads [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
 
@@ -189,7 +189,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     if let Some(path) = &job.stats {
         write_text(path, &stats.to_json())?;
     }
-    print(&summary::text(&renderer, &stats, &targets));
+    print(&summary::text(&renderer, &stats, &targets))?;
     if job.range.is_some() && interrupted.is_set() {
         say("warning", "the range is not complete: it cannot be merged");
     }

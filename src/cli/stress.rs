@@ -60,7 +60,7 @@ pub(super) fn run(
     write_text(&folder.join("stress.csv"), &csv(&report))?;
     let table = markdown(&report, &cases);
     write_text(&folder.join("stress.md"), &table)?;
-    print(&text(&report));
+    print(&text(&report))?;
     if interrupted.is_set() {
         return Ok((Outcome::Interrupted, table));
     }

@@ -19,7 +19,9 @@ pub struct Comparison {
 }
 
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
-#[error("the images differ in size: {0}x{1} and {2}x{3} pixels")]
+#[error(
+    "the images differ in size: {0} x {1} and {2} x {3} pixels; expected one size; crop or scale one of them"
+)]
 pub struct SizeMismatch(u32, u32, u32, u32);
 
 /// Keeps the relative error finite over black.

@@ -20,7 +20,11 @@ impl ChannelFile {
     pub fn read(path: &Path) -> Result<Self, String> {
         let problem = |reason: &str| format!("{}: {reason}", path.display());
         let image = exr::prelude::read_first_flat_layer_from_file(path)
-            .map_err(|error| problem(&error.to_string()))?;
+            .map_err(|error| {
+                problem(&format!(
+                    "cannot be read as OpenEXR ({error}); expected an .exr file that is whole; correct the path or write the file again"
+                ))
+            })?;
         let layer = image.layer_data;
         let mut file = Self {
             width: layer.size.x() as u32,

@@ -24,9 +24,9 @@ use std::path::PathBuf;
 pub enum OutputError {
     #[error("{}: the name must end in .png or .exr", path.display())]
     Extension { path: PathBuf },
-    #[error("{}: is a folder or another special file, not a picture", path.display())]
+    #[error("{}: is a folder or another special file; name a file to write", path.display())]
     NotAFile { path: PathBuf },
-    #[error("{}: the scene is made of this file; give the output another name", path.display())]
+    #[error("{}: is read here and would be overwritten; give the output another name", path.display())]
     Input { path: PathBuf },
     #[error("{}: named for two outputs; give each a name of its own", path.display())]
     Twice { path: PathBuf },

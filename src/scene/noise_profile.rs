@@ -146,7 +146,9 @@ impl NoiseProfile {
         Ok(profile)
     }
 
-    fn check(&self) -> Result<(), String> {
+    /// # Errors
+    /// What no camera measures, in one line.
+    pub fn check(&self) -> Result<(), String> {
         let count = self.bins.len();
         if !count.is_power_of_two() || count > MAX_BINS {
             return Err(format!(
@@ -159,7 +161,7 @@ impl NoiseProfile {
             || means.clone().any(|mean| !(mean.abs() <= 255.0))
         {
             return Err(
-                "a mean or sigma is no number from 0 to 255 DN; expected measured values; calibrate again"
+                "a mean or sigma is no number from 0 to 255 DN; expected measured values; calibrate again, or give other numbers"
                     .to_owned(),
             );
         }

@@ -56,8 +56,28 @@ pub struct NoiseSettings {
 }
 
 impl NoiseSettings {
+    /// Most texels of all bins' textures together: 1 GiB of them.
+    pub const MAX_TEXELS: u64 = 1 << 26;
     /// Largest texture side, texels.
     pub const MAX_TEXTURE_SIZE: u32 = 4096;
+
+    /// Whether the textures are of a size that can be held.
+    ///
+    /// # Errors
+    /// In one line: they are too large together.
+    pub fn check_textures(&self) -> std::result::Result<(), String> {
+        let texels = u64::from(self.texture_size).pow(2) * self.profile.bins.len() as u64;
+        if self.method == NoiseMethod::Textures && texels > Self::MAX_TEXELS {
+            return Err(format!(
+                "{} textures of {} x {} texels are more than {} texels in all; expected fewer or smaller ones; make texture_size smaller",
+                self.profile.bins.len(),
+                self.texture_size,
+                self.texture_size,
+                Self::MAX_TEXELS
+            ));
+        }
+        Ok(())
+    }
 
     pub fn new(profile: NoiseProfile) -> Self {
         Self {
@@ -258,6 +278,11 @@ fn read_noise(table: &Table) -> Result<NoiseSettings> {
     read(table, "eight_bit", &mut settings.eight_bit, |node| {
         node.boolean()
     })?;
+    if let Err(problem) = settings.check_textures() {
+        read(table, "texture_size", &mut settings.texture_size, |node| {
+            Err(node.impossible(&problem))
+        })?;
+    }
     Ok(settings)
 }
 

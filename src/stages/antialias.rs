@@ -31,14 +31,15 @@ pub fn antialias(picture: &mut Picture, mask: &[f32], settings: &AntialiasSettin
                 if mask[y * width + x] == 0.0 {
                     continue;
                 }
-                let mut sum = *value;
+                let mut sum = [0.0f32; 3];
                 let mut count = 1.0f32;
                 for near_y in y.saturating_sub(1)..(y + 2).min(height) {
                     for near_x in x.saturating_sub(1)..(x + 2).min(width) {
                         let near = near_y * width + near_x;
                         if mask[near] == 0.0 {
                             for c in 0..3 {
-                                sum[c] += source[near][c];
+                                // Of differences: a sum of bright values would overflow.
+                                sum[c] += source[near][c] - value[c];
                             }
                             count += 1.0;
                         }
@@ -46,8 +47,7 @@ pub fn antialias(picture: &mut Picture, mask: &[f32], settings: &AntialiasSettin
                 }
                 if count > 1.0 {
                     for c in 0..3 {
-                        let blended = sum[c] / count;
-                        value[c] += settings.beta * (blended - value[c]);
+                        value[c] += settings.beta * (sum[c] / count);
                     }
                 }
             }

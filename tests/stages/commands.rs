@@ -371,3 +371,146 @@ fn what_cannot_be_used_is_refused() {
         );
     }
 }
+
+#[test]
+fn inputs_are_never_overwritten() {
+    let folder = Folder::new();
+    layers(&folder);
+    for f in 0..3 {
+        noisy(&folder, &format!("f{f}.png"), 140.0, 3.0, 100 + f);
+    }
+    folder.done(&["noise", "calibrate", "--from", "0.02,2", "-o", "noise.toml"]);
+    let refused = |arguments: &[&str], kept: &str, said: &str| {
+        let before = std::fs::read(folder.path(kept)).unwrap();
+        let output = folder.run(arguments);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?} {message}");
+        assert!(message.contains(said), "{arguments:?} {message}");
+        assert_eq!(std::fs::read(folder.path(kept)).unwrap(), before);
+    };
+    let read = "would be overwritten";
+    refused(&["cartoon", "photo.png", "photo.png"], "photo.png", read);
+    refused(&["cartoon", "photo.png", "./photo.png"], "photo.png", read);
+    refused(
+        &[
+            "antialias",
+            "photo.png",
+            "layer.png",
+            "mask.png",
+            "-o",
+            "layer.png",
+        ],
+        "layer.png",
+        read,
+    );
+    let apply = [
+        "noise",
+        "apply",
+        "photo.png",
+        "layer.png",
+        "mask.png",
+        "--profile",
+        "noise.toml",
+        "-o",
+    ];
+    refused(&[&apply[..], &["photo.png"]].concat(), "photo.png", read);
+    refused(
+        &[
+            "noise",
+            "calibrate",
+            "f0.png",
+            "f1.png",
+            "f2.png",
+            "-o",
+            "f0.png",
+        ],
+        "f0.png",
+        read,
+    );
+    refused(&["noise", "calibrate", ".", "-o", "f0.png"], "f0.png", read);
+    let twice = [
+        "noise",
+        "calibrate",
+        "f0.png",
+        "f1.png",
+        "-o",
+        "x",
+        "--report",
+        "x",
+    ];
+    refused(&twice, "f0.png", "named for two outputs");
+    refused(
+        &["cartoon", "photo.png", "out.png", "--edges", "out.png"],
+        "photo.png",
+        "named for two outputs",
+    );
+    folder.done(&["cartoon", "photo.png", "control.png"]);
+}
+
+#[test]
+fn what_a_calibration_cannot_use_is_named() {
+    let folder = Folder::new();
+    for f in 0..3 {
+        noisy(&folder, &format!("f{f}.png"), 140.0, 3.0, 100 + f);
+    }
+    let refused = |frames: &[&str], said: &str| {
+        let arguments = [&["noise", "calibrate", "-o", "n.toml"][..], frames].concat();
+        let output = folder.run(&arguments);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?} {message}");
+        assert!(message.contains(said), "{arguments:?} {message}");
+        assert!(!folder.path("n.toml").exists());
+    };
+    refused(&["f0.png", "f1.png", "./f0.png"], "named twice");
+    refused(&["."; 2], "named twice");
+    refused(&["nope.png", "f0.png"], "nope.png: it cannot be read");
+    refused(&["--from=-1,-1"], "--from");
+    refused(&["--from", "1e4,1e4"], "from 0 to 255 DN");
+    folder.done(&[
+        "noise",
+        "calibrate",
+        "-o",
+        "n.toml",
+        "f0.png",
+        "f1.png",
+        "f2.png",
+    ]);
+}
+
+#[test]
+fn textures_beyond_all_memory_are_refused() {
+    let folder = Folder::new();
+    layers(&folder);
+    folder.done(&[
+        "noise",
+        "calibrate",
+        "--from",
+        "0.02,2",
+        "--bins",
+        "256",
+        "-o",
+        "noise.toml",
+    ]);
+    let apply = |more: &[&str]| {
+        let fixed = [
+            "noise",
+            "apply",
+            "photo.png",
+            "layer.png",
+            "mask.png",
+            "--profile",
+            "noise.toml",
+            "-o",
+            "out.png",
+        ];
+        folder.run(&[&fixed[..], &["--method", "textures"], more].concat())
+    };
+    let output = apply(&["--texture-size", "4096"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("texels in all"));
+    assert_eq!(
+        apply(&["--texture-size", "64"]).status.code(),
+        Some(0),
+        "control"
+    );
+}

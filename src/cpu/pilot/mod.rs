@@ -96,7 +96,11 @@ fn measure(
     flags: &[u32],
 ) -> Vec<measurement::BlockMoments> {
     let frame = scene.frame;
-    scene.frame.seed = SEED;
+    scene.frame.seed = if scene.frame.seed == SEED {
+        !SEED
+    } else {
+        SEED
+    };
     scene.frame.flags &= !FRAME_AOVS;
     scene.pixels = flags.iter().copied().map(PixelInfo::uniform).collect();
     let measured = measurement::measure(scene, blocks);

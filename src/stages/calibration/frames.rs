@@ -40,8 +40,24 @@ pub fn group_frames(arguments: &[PathBuf]) -> Result<Vec<SceneFrames>, Calibrati
             vec![argument.clone()]
         };
         for path in paths {
-            let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+            // One path a file, however it was named: a frame that counts twice would make the noise seem smaller.
+            let path = path
+                .canonicalize()
+                .map_err(|error| CalibrationError::Frame {
+                    path: path.clone(),
+                    problem: format!(
+                        "it cannot be read ({error}); expected a picture; correct the path"
+                    ),
+                })?;
+            let folder = path.parent().unwrap_or(Path::new(".")).to_path_buf();
             match scenes.iter_mut().find(|scene| scene.folder == folder) {
+                Some(scene) if scene.paths.contains(&path) => {
+                    return Err(CalibrationError::Frame {
+                        path,
+                        problem: "it is named twice; expected each frame once; leave one out"
+                            .to_owned(),
+                    });
+                }
                 Some(scene) => scene.paths.push(path),
                 None => scenes.push(SceneFrames {
                     name: scene_name(&folder),
