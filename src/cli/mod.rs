@@ -14,6 +14,7 @@ mod merge;
 mod noise;
 mod progress;
 mod render;
+mod sequence;
 mod stage_device;
 mod stress;
 mod summary;
@@ -37,6 +38,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(render::Arguments),
+    Sequence(sequence::Arguments),
     Merge(merge::Arguments),
     Bench(bench::Arguments),
     Cartoon(cartoon::Arguments),
@@ -68,6 +70,7 @@ impl<E: std::error::Error> From<E> for Failure {
 pub fn run() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
+        Command::Sequence(arguments) => sequence::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
         Command::Bench(arguments) => arguments.check().and_then(bench::run),
         Command::Cartoon(arguments) => cartoon::run(&arguments),

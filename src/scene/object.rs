@@ -14,6 +14,7 @@ use super::pose::read_transform;
 use super::reader::{Choice, Node, Table};
 use super::scan::settle_scan;
 use super::shape::Shape;
+use super::shutter::read_object_motion;
 use super::{AlphaMode, Instance, Light, LightKind, Material, Object, Side};
 
 const KEYS: &[&str] = &[
@@ -25,6 +26,7 @@ const KEYS: &[&str] = &[
     "rotation",
     "scale",
     "material",
+    "motion",
 ];
 
 const REAL_KEYS: &[&str] = &["albedo", "smooth_radius_m", "self_shadow_bias_m"];
@@ -91,6 +93,7 @@ impl<'w> ObjectReader<'w> {
             name: name.unwrap_or(parts.name),
             side,
             world_from_object,
+            motion: read_object_motion(&table, world_from_object)?,
             instances: parts.instances,
             self_shadow_bias_m: 0.0,
             albedo_from_photo: false,
@@ -192,6 +195,21 @@ impl<'w> ObjectReader<'w> {
     }
 }
 
+impl Object {
+    /// The smallest box along the object's own axes around all its vertices: least and greatest corner; `None` if it is empty.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let points = self.instances.iter().flat_map(|instance| {
+            let transform = instance.object_from_local;
+            (instance.primitive.positions.iter())
+                .map(move |p| transform.transform_point3(DVec3::from(p.map(f64::from))))
+        });
+        points.fold(None, |bounds, p| {
+            let (lo, hi) = bounds.unwrap_or((p, p));
+            Some((lo.min(p), hi.max(p)))
+        })
+    }
+}
+
 /// Refuses keys that do not go with this side and shape; returns the shape.
 fn check_keys(table: &Table, side: Side) -> Result<Option<Shape>> {
     table.refuse_both("mesh", "shape")?;
@@ -204,6 +222,12 @@ fn check_keys(table: &Table, side: Side) -> Result<Option<Shape>> {
             if let Some(error) = table.key_error(key, &message) {
                 return Err(error);
             }
+        }
+    }
+    if side == Side::Real {
+        let message = "`motion` in [[real]]; expected it in [[virtual]] only: the photograph shows real things where they are; remove it";
+        if let Some(error) = table.key_error("motion", message) {
+            return Err(error);
         }
     }
     let mut known = KEYS.to_vec();

@@ -1,5 +1,7 @@
 //! The stages that a scene asks for, in their order, on a film's composite.
 
+use std::time::Instant;
+
 use super::EncodedImage;
 use super::antialias::antialias;
 use super::cartoon::cartoon;
@@ -14,6 +16,16 @@ use crate::scene::{Composite, NoiseMethod, NoiseSettings, Scene};
 pub struct Finished {
     pub picture: Picture,
     pub notes: Vec<String>,
+    pub seconds: StageSeconds,
+}
+
+/// What each stage took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageSeconds {
+    pub antialias: f64,
+    pub motion_blur: f64,
+    pub noise: f64,
+    pub cartoon: f64,
 }
 
 /// Applies the scene's stages to the composite `picture` of `film`, as frame number `frame` of a video. Without a stage the picture
@@ -27,12 +39,16 @@ pub fn finish(
 ) -> Finished {
     let stages = &scene.stages;
     let mut notes = Vec::new();
+    let mut seconds = StageSeconds::default();
+    let begin = Instant::now();
     if let Some(settings) = &stages.cartoon {
         let image = EncodedImage::from_picture(&picture);
         let done = on_gpu(gpu, &mut notes, |gpu| gpu.cartoon(&image, settings, false));
         let result = done.unwrap_or_else(|| cartoon(&image, settings, false));
         picture = result.image.to_picture();
+        seconds.cartoon = begin.elapsed().as_secs_f64();
     }
+    let begin = Instant::now();
     if let Some(settings) = &stages.antialias {
         let mask = mask(film);
         let done = on_gpu(gpu, &mut notes, |gpu| {
@@ -41,7 +57,9 @@ pub fn finish(
         if !done.unwrap_or_else(|| antialias(&mut picture, &mask, settings)) {
             notes.push("[antialias] is off: the film's borders are smooth already".to_owned());
         }
+        seconds.antialias = begin.elapsed().as_secs_f64();
     }
+    let begin = Instant::now();
     if let Some(settings) = &stages.noise {
         let stage = NoiseStage::new(settings, scene.settings.seed);
         let mask = mask(film);
@@ -73,8 +91,13 @@ pub fn finish(
         if done.is_none() {
             stage.apply(&mut picture, &input, frame);
         }
+        seconds.noise = begin.elapsed().as_secs_f64();
     }
-    Finished { picture, notes }
+    Finished {
+        picture,
+        notes,
+        seconds,
+    }
 }
 
 /// What `run` gives on the GPU; None without one, or where it cannot, which is noted.

@@ -13,4 +13,4 @@ pub mod noise;
 mod own_variance;
 
 pub use encoded::EncodedImage;
-pub use finish::{Finished, finish};
+pub use finish::{Finished, StageSeconds, finish};
