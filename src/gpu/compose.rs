@@ -47,6 +47,10 @@ pub const MODULES: &[(&str, &str)] = &[
         include_str!("../../shaders/stages_cartoon.wgsl"),
     ),
     (
+        "stages_copies",
+        include_str!("../../shaders/stages_copies.wgsl"),
+    ),
+    (
         "stages_curve",
         include_str!("../../shaders/stages_curve.wgsl"),
     ),

@@ -19,6 +19,7 @@
 
 mod control;
 mod motion;
+mod picture_motion;
 mod photo_albedo;
 mod skips;
 mod stats;
@@ -29,6 +30,7 @@ use glam::DMat4;
 
 pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
 pub use motion::FrameEdit;
+pub use picture_motion::PreviousView;
 pub use skips::{Skip, Without};
 pub use stats::{Stats, StatsRays};
 

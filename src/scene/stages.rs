@@ -278,8 +278,8 @@ fn read_motion_blur(table: &Table) -> Result<MotionBlurSettings> {
     let mut settings = MotionBlurSettings::default();
     read(table, "method", &mut settings.method, |node| node.choice())?;
     let length = |node: &Node| {
-        let expected = "pixels from 0 to 1e4";
-        Ok(node.number(expected, |x| (0.0..=1e4).contains(&x))? as f32)
+        let expected = "pixels from 0 to 4096";
+        Ok(node.number(expected, |x| (0.0..=4096.0).contains(&x))? as f32)
     };
     read(table, "min_length_px", &mut settings.min_length_px, length)?;
     read(table, "max_length_px", &mut settings.max_length_px, length)?;

@@ -13,9 +13,9 @@ use crate::cli::{Failure, Outcome, interrupt, print, say};
 use crate::gpu::GpuStages;
 use crate::output::{check_writable, write_text};
 use crate::packed::next_anchor;
-use crate::renderer::{Budget, FrameEdit, RayTotals, Renderer, RendererOptions};
+use crate::renderer::{Budget, FrameEdit, PreviousView, RayTotals, Renderer, RendererOptions};
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
-use crate::scene::{Camera, Exposure, Lens, Scene, fingerprint_of};
+use crate::scene::{Camera, Exposure, Lens, MotionBlurMethod, Scene, fingerprint_of};
 use crate::stages::{Finished, finish};
 use crate::video::{FrameSink, FrameSource, Header, SinkPlan, VideoFrame};
 
@@ -192,6 +192,10 @@ impl Sequence<'_> {
         };
         let time_secs = view.time_secs.unwrap_or(0.0);
         let near = near(self.views, time_secs);
+        let previous = near.key_before(time_secs).map(|(time_secs, pose)| PreviousView {
+            world_from_camera: pose,
+            time_secs,
+        });
         let lens = Lens {
             focus_distance_m: pulled_focus(self.arguments.focus_pull, self.span, name.number)
                 .or(view.focus_distance_m)
@@ -237,6 +241,11 @@ impl Sequence<'_> {
         let begin = Instant::now();
         let picture = renderer.picture();
         self.seconds.composite += begin.elapsed().as_secs_f64();
+        let copies = (renderer.scene().stages.motion_blur)
+            .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);
+        let motion = previous
+            .filter(|_| copies)
+            .map(|previous| renderer.picture_motion(&previous));
         let Finished {
             picture,
             notes,
@@ -246,6 +255,7 @@ impl Sequence<'_> {
             renderer.film(),
             renderer.scene(),
             name.number,
+            motion.as_ref(),
             started.gpu.as_ref(),
         );
         self.seconds.add_stages(&seconds);

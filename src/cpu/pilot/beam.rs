@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::camera::lens::camera_ray_from;
+use crate::camera::lens::{camera_ray_from, lens_undistort};
 use crate::camera::shutter::{CameraPose, camera_pose, camera_pose_at};
 use crate::packed::{FRAME_SHUTTER, Frame, PackedScene, SHUTTER_POSES};
 
@@ -61,20 +61,22 @@ impl Beam {
         let poses = RowPoses::of(frame, row);
         let middle = poses.all[0];
         let axis = -middle.back;
-        let ray = |pose: &CameraPose, dx: f32, dy: f32| {
-            camera_ray_from(pinhole, pose, x + dx, y + dy, 0.5, 0.5)
-        };
-        let centre = ray(&middle, 0.5, 0.5);
+        let centre = camera_ray_from(pinhole, &middle, x + 0.5, y + 0.5, 0.5, 0.5);
         let at_depth_1 = |d: Vec3| d / d.dot(axis).max(1e-6);
         let ahead = at_depth_1(centre.direction);
+        let [fx, fy, cx, cy] = frame.intrinsics;
+        // The distortion is the same wherever the camera is.
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+            .map(|(dx, dy)| lens_undistort(frame, (x + dx - cx) / fx, (y + dy - cy) / fy));
         let (mut footprint, mut shake) = (0.0f32, 0.0f32);
         for pose in &poses.all[..poses.count] {
-            for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-                let direction = at_depth_1(ray(pose, dx, dy).direction);
+            // What a step of the camera does to the ray at a given depth, and what the lens's plane does that turns with it.
+            let step = pose.position.distance(middle.position);
+            let turn = 2.0 * frame.aperture_radius * pose.back.distance(middle.back);
+            for ideal in corners {
+                let direction =
+                    at_depth_1(pose.right * ideal[0] - (pose.up * ideal[1] + pose.back));
                 footprint = footprint.max(direction.distance(ahead));
-                // What a step of the camera does to the ray at a given depth, and what the lens's plane does that turns with it.
-                let step = pose.position.distance(middle.position);
-                let turn = 2.0 * frame.aperture_radius * pose.back.distance(middle.back);
                 shake = shake.max((step + turn) * (1.0 + direction.length()));
             }
         }

@@ -50,6 +50,12 @@ impl CameraPath {
         ))
     }
 
+    /// The last key before a time.
+    pub fn key_before(&self, time_secs: f64) -> Option<(f64, DMat4)> {
+        let before = self.keys.partition_point(|key| key.0 < time_secs);
+        Some(self.keys[before.checked_sub(1)?])
+    }
+
     /// The time lies between two keys or on one.
     pub fn covers(&self, time_secs: f64) -> bool {
         match (self.keys.first(), self.keys.last()) {
