@@ -66,7 +66,7 @@ pub fn load_with(path: &Path, given: Given) -> std::result::Result<Scene, SceneE
     read_scene(&Source::new(path, bytes)?, given)
 }
 
-fn read_scene(source: &Source, given: Given) -> Result<Scene> {
+pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
     let document = DeTable::parse(&source.text).map_err(|error| {
         let offset = error.span().map_or(0, |span| span.start);
         let message = match error.message().split_once(", expected ") {

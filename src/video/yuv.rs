@@ -120,14 +120,14 @@ pub fn encode_yuv(
 mod tests {
     use super::*;
 
-    fn header(chroma: &str, more: &str) -> Header {
+    fn header_of(chroma: &str, more: &str) -> Header {
         Header::parse(&format!("YUV4MPEG2 W6 H4 F25:1 C{chroma} {more}")).expect("parses")
     }
 
     /// ITU-R BT.601's own table of colour bars at 100 percent, limited range.
     #[test]
     fn colour_bars_have_the_standards_codes() {
-        let header = header("444", "");
+        let header = header_of("444", "");
         for (rgb, yuv) in [
             ([255, 255, 255], [235, 128, 128]),
             ([255, 255, 0], [210, 16, 146]),
@@ -143,14 +143,14 @@ mod tests {
             let back = range.decode(yuv);
             assert!(rgb.iter().zip(back).all(|(a, b)| a.abs_diff(b) <= 1), "{rgb:?} {back:?}");
         }
-        let full = Range::of(&self::header("444", "XCOLORRANGE=FULL"));
+        let full = Range::of(&header_of("444", "XCOLORRANGE=FULL"));
         assert_eq!(full.encode([255; 3]).map(code), [255, 128, 128], "control: another range");
     }
 
     #[test]
     fn what_is_not_changed_keeps_its_bytes() {
         for chroma in ["420jpeg", "422", "444"] {
-            let header = header(chroma, "");
+            let header = header_of(chroma, "");
             let planes: Vec<u8> = (0..header.frame_bytes())
                 .map(|i| crate::math::hash_u32(i as u32) as u8)
                 .collect();
