@@ -7,8 +7,9 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::lights::pack_lights;
 use super::materials::{MaterialKey, MaterialTable};
 use super::{
-    FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER, FRAME_SHUTTER_ORDERED, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES,
-    NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, Triangle, Vertex,
+    FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER, FRAME_SHUTTER_ORDERED, Frame,
+    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL,
+    PackedScene, PixelInfo, Triangle, Vertex,
 };
 use crate::accel::{AccelError, WorldBvh};
 use crate::camera::lens::frame_camera;

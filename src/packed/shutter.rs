@@ -5,7 +5,7 @@ use glam::{DMat4, DVec3};
 use super::{FRAME_SHUTTER, FRAME_SHUTTER_ORDERED, PackError, PackedScene, SHUTTER_POSES};
 use crate::camera::lens::project;
 use crate::camera::shutter::frame_poses;
-use crate::scene::{MotionBlurMethod, SamplerKind, Scene, Shutter, Side};
+use crate::scene::{MotionBlurMethod, SamplerKind, Scene, Shutter};
 
 /// Where objects move, they stand still from one of these to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,7 +89,9 @@ pub fn instants(scene: &Scene) -> Vec<Instant> {
     let most = f64::from(scene.settings.rays_per_pixel);
     let in_exposure = wanted.clamp(1.0, most.min(f64::from(Shutter::MAX_SAMPLES)));
     let count = match open > 0.0 {
-        true => (in_exposure / open).ceil().min(f64::from(Shutter::MAX_SAMPLES)),
+        true => (in_exposure / open)
+            .ceil()
+            .min(f64::from(Shutter::MAX_SAMPLES)),
         false => wanted.clamp(1.0, f64::from(scene.camera.height)),
     } as u32;
     let share = |i: f64| i / f64::from(count);
@@ -106,26 +108,21 @@ pub fn instants(scene: &Scene) -> Vec<Instant> {
 fn fastest_step_px(scene: &Scene, opens: f64, closes: f64) -> f64 {
     const STEPS: u32 = 16;
     let mut longest = 0.0f64;
-    let objects = scene.objects.iter().filter(|o| o.side == Side::Virtual);
-    for object in objects {
-        let Some(motion) = &object.motion else {
-            continue;
-        };
-        let time = |i: u32| opens + (closes - opens) * f64::from(i) / f64::from(STEPS);
-        let poses: Vec<DMat4> = (0..=STEPS).map(|i| motion.at(time(i))).collect();
-        if poses.iter().all(|pose| *pose == poses[0]) {
+    let time = |i: u32| opens + (closes - opens) * f64::from(i) / f64::from(STEPS);
+    let animated = scene.objects.iter().filter(|o| o.is_animated());
+    let parts = animated.flat_map(|object| object.instances.iter().map(move |i| (object, i)));
+    for (object, instance) in parts {
+        let places: Vec<DMat4> = (0..=STEPS)
+            .map(|i| object.world_from_object_at(time(i)) * instance.object_from_local_at(time(i)))
+            .collect();
+        if places.iter().all(|place| *place == places[0]) {
             continue;
         }
         longest = longest.max(1.0);
-        let Some((lo, hi)) = object.bounds() else {
-            continue;
-        };
-        for corner in 0..8u32 {
-            let side = |axis: usize| if corner >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
-            let corner = DVec3::new(side(0), side(1), side(2));
-            let seen: Vec<Option<DVec3>> = poses
+        for corner in instance.corners() {
+            let seen: Vec<Option<DVec3>> = places
                 .iter()
-                .map(|pose| project(&scene.camera, pose.transform_point3(corner)))
+                .map(|place| project(&scene.camera, place.transform_point3(corner)))
                 .collect();
             let length: f64 = seen
                 .windows(2)

@@ -78,6 +78,7 @@ pub fn test_mesh(
         world_from_object: DMat4::IDENTITY,
         motion: None,
         instances: vec![Instance {
+            animation: None,
             object_from_local: DMat4::IDENTITY,
             primitive: primitive.into(),
             material: material.into(),

@@ -19,8 +19,8 @@
 
 mod control;
 mod motion;
-mod picture_motion;
 mod photo_albedo;
+mod picture_motion;
 mod skips;
 mod stats;
 
@@ -37,9 +37,7 @@ pub use stats::{Stats, StatsRays};
 use crate::cpu;
 use crate::film::{Film, MergeError, Picture, Planes, composite, planes};
 use crate::gpu::{AdapterChoice, Changed, GpuBackend, GpuDevice, GpuError};
-use crate::packed::{
-    FRAME_AOVS, Instant, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene,
-};
+use crate::packed::{FRAME_AOVS, Instant, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Side};
 
 /// The longest a pass runs before the film is shown, in rays per pixel.
@@ -97,6 +95,8 @@ pub struct Renderer {
     instants: Vec<Instant>,
     /// The first instant that may have samples left to take.
     next_instant: usize,
+    /// The picture's time.
+    time_secs: f64,
 }
 
 enum Backend {
@@ -119,6 +119,7 @@ impl Renderer {
             return Err(RenderError::SampleRange(first_sample, end_sample, total));
         }
         let packed = PackedScene::build(&scene)?;
+        let time_secs = scene.shutter.map_or(0.0, |shutter| shutter.time_secs);
         let film = Film::new(
             packed.frame.width,
             packed.frame.height,
@@ -137,6 +138,7 @@ impl Renderer {
             notes: Vec::new(),
             instants: Vec::new(),
             next_instant: 0,
+            time_secs,
         };
         renderer.prepare_photo();
         renderer.prepare_shutter()?;
@@ -380,6 +382,9 @@ impl Renderer {
             .ok_or(RenderError::NoSuchObject(object))?;
         entry.world_from_object = world_from_object;
         entry.motion = None;
+        for instance in &mut entry.instances {
+            instance.animation = None;
+        }
         match entry.side {
             Side::Virtual => {
                 self.packed.rebuild_virtual(&self.scene)?;

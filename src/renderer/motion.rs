@@ -56,9 +56,15 @@ impl Renderer {
         if let Some(shutter) = &mut self.scene.shutter {
             shutter.time_secs = edit.time_secs;
         }
+        self.time_secs = edit.time_secs;
         let placed = |renderer: &Self| -> Vec<_> {
-            let objects = renderer.scene.objects.iter();
-            objects.map(|object| object.world_from_object).collect()
+            let objects = renderer.scene.objects.iter().filter(|o| o.is_animated());
+            objects
+                .flat_map(|object| {
+                    let parts = object.instances.iter();
+                    parts.map(|part| object.world_from_object * part.object_from_local)
+                })
+                .collect()
         };
         // After moving objects were traced, the virtual world stands at the last instant.
         let stale = !self.instants.is_empty();
@@ -93,7 +99,8 @@ impl Renderer {
         self.next_instant = 0;
         let swept = swept_before || !self.instants.is_empty();
         self.packed.sweep(&mut self.scene, &self.instants)?;
-        self.packed.set_shutter(&self.scene, !self.instants.is_empty());
+        self.packed
+            .set_shutter(&self.scene, !self.instants.is_empty());
         Ok(swept)
     }
 

@@ -46,14 +46,8 @@ impl Renderer {
 
     /// Pixel and depth of an object's centre, now and in the frame before.
     fn centres(&self, object: &Object, before: &Camera, time_secs: f64) -> Option<(DVec3, DVec3)> {
-        let (lo, hi) = object.bounds()?;
-        let centre = (lo + hi) * 0.5;
-        let world_before = match &object.motion {
-            Some(motion) => motion.at(time_secs),
-            None => object.world_from_object,
-        };
-        let now = object.world_from_object.transform_point3(centre);
-        let then = world_before.transform_point3(centre);
+        let now = object.centre_at(self.time_secs)?;
+        let then = object.centre_at(time_secs)?;
         Some((project(&self.scene.camera, now)?, project(before, then)?))
     }
 

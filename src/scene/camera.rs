@@ -42,7 +42,9 @@ pub(super) fn read_camera(
 ) -> Result<Camera> {
     let table = root.table("camera", "[camera]", CAMERA_KEYS)?;
     if let Some(given) = given {
-        let size = photo.map(|photo| (photo.width, photo.height)).or(given.size);
+        let size = photo
+            .map(|photo| (photo.width, photo.height))
+            .or(given.size);
         let pose = table.as_ref().map(read_camera_pose).transpose()?;
         return size
             .ok_or_else(|| "the intrinsics tell no size".to_owned())

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-use super::{Photo, Scene};
 use super::camera::{read_camera, read_lens};
 use super::environment::read_environment;
 use super::error::{Result, SceneError, Source};
@@ -16,6 +15,7 @@ use super::settings::read_settings;
 use super::shutter::{read_camera_motion, read_shutter};
 use super::stages::read_stages;
 use super::trajectory::Intrinsics;
+use super::{Photo, Scene};
 
 const TABLES: &[&str] = &[
     "photo",

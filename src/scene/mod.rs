@@ -3,6 +3,7 @@
 //! [`load`] turns a scene file into a [`Scene`]; everything a file can get wrong is refused there, with file, line and column.
 //! What leaves this module is finite, in range and refers only to things that exist.
 
+pub mod animation;
 mod camera;
 mod environment;
 mod error;
@@ -20,17 +21,17 @@ mod reader;
 mod scan;
 mod settings;
 pub(crate) mod shape;
+mod shutter;
 pub mod smooth;
 pub mod srgb;
-mod shutter;
 mod stages;
 #[cfg(test)]
 mod tests;
 pub mod trajectory;
 
 pub use error::SceneError;
-pub use fingerprint::fingerprint_of;
 pub use file::{Given, load, load_with};
+pub use fingerprint::fingerprint_of;
 pub use noise_profile::{
     Autocorrelation, LAGS, MAX_BINS, NOISE_PROFILE_VERSION, NoiseBin, NoiseFit, NoiseProfile,
     WHITE, bin_index,
@@ -218,7 +219,10 @@ pub struct Object {
 
 #[derive(Clone, Debug)]
 pub struct Instance {
+    /// At the picture's time.
     pub object_from_local: DMat4,
+    /// What moves it within its object, if anything does.
+    pub animation: Option<animation::InstanceAnimation>,
     pub primitive: Arc<Primitive>,
     pub material: Arc<Material>,
 }

@@ -69,7 +69,10 @@ impl ObjectMotion {
     /// World-from-object at a time: the object as it is placed, then moved.
     pub fn at(&self, time_secs: f64) -> DMat4 {
         let after = self.keys.partition_point(|key| key.time_secs <= time_secs);
-        let moved = match (after.checked_sub(1).map(|i| self.keys[i]), self.keys.get(after)) {
+        let moved = match (
+            after.checked_sub(1).map(|i| self.keys[i]),
+            self.keys.get(after),
+        ) {
             (None, None) => return self.rest,
             (None, Some(key)) => *key,
             (Some(key), None) => key,
@@ -96,9 +99,10 @@ impl ObjectMotion {
 impl Scene {
     /// Puts the moving objects where they are at that time.
     pub fn set_time(&mut self, time_secs: f64) {
-        for object in &mut self.objects {
-            if let Some(motion) = &object.motion {
-                object.world_from_object = motion.at(time_secs);
+        for object in self.objects.iter_mut().filter(|o| o.is_animated()) {
+            object.world_from_object = object.world_from_object_at(time_secs);
+            for instance in &mut object.instances {
+                instance.object_from_local = instance.object_from_local_at(time_secs);
             }
         }
     }
@@ -120,9 +124,8 @@ pub(super) fn read_shutter(root: &Table) -> Result<Option<Shutter>> {
     let Some(table) = root.table("shutter", "[shutter]", SHUTTER_KEYS)? else {
         return Ok(None);
     };
-    let seconds = |node: &Node| {
-        node.number("seconds from 0 to 1e6", |x| is_not_negative(x) && x <= 1e6)
-    };
+    let seconds =
+        |node: &Node| node.number("seconds from 0 to 1e6", |x| is_not_negative(x) && x <= 1e6);
     Ok(Some(Shutter {
         exposure_secs: table.required("exposure_secs", "exposure_secs = 0.02", seconds)?,
         readout_secs: table.optional("readout_secs", seconds)?.unwrap_or(0.0),
@@ -144,7 +147,13 @@ pub(super) fn read_camera_motion(root: &Table) -> Result<CameraPath> {
         }
     }
     let keys = keys.iter().map(|node| {
-        let known = &["time_secs", "world_from_camera", "position", "look_at", "up"];
+        let known = &[
+            "time_secs",
+            "world_from_camera",
+            "position",
+            "look_at",
+            "up",
+        ];
         let table = node.table("[[camera.motion]]", known)?;
         Ok((read_time(&table)?, read_camera_pose(&table)?))
     });
@@ -155,7 +164,13 @@ pub(super) fn read_camera_motion(root: &Table) -> Result<CameraPath> {
 pub(super) fn read_object_motion(table: &Table, rest: DMat4) -> Result<Option<ObjectMotion>> {
     let nodes = table.list("motion")?;
     let keys = nodes.iter().map(|node| {
-        let known = &["time_secs", "translation", "rotation_deg", "rotation", "scale"];
+        let known = &[
+            "time_secs",
+            "translation",
+            "rotation_deg",
+            "rotation",
+            "scale",
+        ];
         let table = node.table("[[virtual.motion]]", known)?;
         let (scale, rotation, translation) = read_placement(&table)?;
         Ok(MotionKey {

@@ -88,6 +88,7 @@ pub(super) fn object(
         motion: None,
         world_from_object,
         instances: vec![Instance {
+            animation: None,
             object_from_local: DMat4::IDENTITY,
             primitive: Arc::new(primitive),
             material: Arc::new(material),

@@ -124,11 +124,15 @@ impl FrameSink {
     pub fn pass(&mut self, name: &FrameName, frame: &VideoFrame) -> Result<(), VideoError> {
         match (&self.kind, &frame.pixels) {
             (Kind::Folder(folder), Pixels::File(path))
-                if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) =>
+                if path
+                    .extension()
+                    .is_some_and(|e| e.eq_ignore_ascii_case("png")) =>
             {
                 let bytes = std::fs::read(path).map_err(|error| VideoError::File {
                     path: path.clone(),
-                    message: format!("it cannot be read ({error}); expected a picture; check the disk"),
+                    message: format!(
+                        "it cannot be read ({error}); expected a picture; check the disk"
+                    ),
                 })?;
                 Ok(write_bytes(&png_path(folder, name), &bytes)?)
             }
@@ -166,21 +170,31 @@ impl FrameSink {
     /// # Errors
     /// It cannot be renamed.
     pub fn finish(self) -> Result<(), VideoError> {
-        if let Kind::Y4mFile { file, part, path, .. } = self.kind {
+        if let Kind::Y4mFile {
+            file, part, path, ..
+        } = self.kind
+        {
             drop(file);
-            std::fs::rename(&part, &path).map_err(|error| Place::File(path).error(cannot_write(&error)))?;
+            std::fs::rename(&part, &path)
+                .map_err(|error| Place::File(path).error(cannot_write(&error)))?;
         }
         Ok(())
     }
 }
 
 fn cannot_write(error: &std::io::Error) -> String {
-    format!("it cannot be written ({error}); expected room for the frames; make room, then go on with the same command")
+    format!(
+        "it cannot be written ({error}); expected room for the frames; make room, then go on with the same command"
+    )
 }
 
 fn png_path(folder: &Path, name: &FrameName) -> PathBuf {
     let stem = match &name.file {
-        Some(file) => Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        Some(file) => Path::new(file)
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
         None => format!("frame_{:06}", name.number),
     };
     folder.join(format!("{stem}.png"))
@@ -210,7 +224,8 @@ fn open_folder(plan: &SinkPlan<'_>) -> Result<(), VideoError> {
             if !plan.overwrite {
                 return Err(foreign(folder));
             }
-            std::fs::remove_file(&path).map_err(|error| Place::File(path).error(cannot_write(&error)))?;
+            std::fs::remove_file(&path)
+                .map_err(|error| Place::File(path).error(cannot_write(&error)))?;
         }
     }
     Ok(write_text(&note_path, &note)?)
@@ -241,7 +256,8 @@ fn open_y4m(plan: &SinkPlan<'_>) -> Result<Kind, VideoError> {
     let there = length.saturating_sub(begin) / frame;
     if length < begin {
         file.set_len(0).map_err(failed)?;
-        file.write_all(format!("{line}\n").as_bytes()).map_err(failed)?;
+        file.write_all(format!("{line}\n").as_bytes())
+            .map_err(failed)?;
     }
     // A frame that was being written when the program ended goes.
     file.set_len(begin + there * frame).map_err(failed)?;

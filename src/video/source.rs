@@ -45,7 +45,11 @@ pub struct FrameSource {
 enum Kind {
     Folder(Vec<(FrameName, PathBuf)>),
     Y4m(Box<Y4mReader<Box<dyn Read>>>),
-    Jpegs { bytes: Vec<u8>, frames: Vec<Range<usize>>, path: PathBuf },
+    Jpegs {
+        bytes: Vec<u8>,
+        frames: Vec<Range<usize>>,
+        path: PathBuf,
+    },
 }
 
 impl FrameSource {
@@ -105,7 +109,11 @@ impl FrameSource {
                 let frame = wanted(name).then(|| read_picture(path)).transpose()?;
                 Ok(Some((name.clone(), frame)))
             }
-            Kind::Jpegs { bytes, frames, path } => {
+            Kind::Jpegs {
+                bytes,
+                frames,
+                path,
+            } => {
                 let Some(range) = frames.get(index as usize) else {
                     return Ok(None);
                 };
@@ -172,7 +180,10 @@ fn read_picture(path: &Path) -> Result<VideoFrame, VideoError> {
 /// The pictures of a folder, by the numbers at the ends of their names, or by name where one has none.
 fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
     let unreadable = |error: std::io::Error| {
-        file_error(folder, format!("it cannot be read ({error}); expected a folder of frames; correct the rights"))
+        file_error(
+            folder,
+            format!("it cannot be read ({error}); expected a folder of frames; correct the rights"),
+        )
     };
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
@@ -189,15 +200,23 @@ fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
         }
     }
     if files.is_empty() {
-        return Err(file_error(folder, "it holds no picture; expected frames as PNG, JPEG, EXR or HDR; name another folder"));
+        return Err(file_error(
+            folder,
+            "it holds no picture; expected frames as PNG, JPEG, EXR or HDR; name another folder",
+        ));
     }
     files.sort();
-    let numbers: Option<Vec<u32>> = files.iter().map(|(name, _)| trailing_number(name)).collect();
+    let numbers: Option<Vec<u32>> = files
+        .iter()
+        .map(|(name, _)| trailing_number(name))
+        .collect();
     let mut named: Vec<(FrameName, PathBuf)> = files
         .into_iter()
         .enumerate()
         .map(|(index, (name, path))| {
-            let number = numbers.as_ref().map_or(index as u32, |numbers| numbers[index]);
+            let number = numbers
+                .as_ref()
+                .map_or(index as u32, |numbers| numbers[index]);
             let name = FrameName {
                 label: name.clone(),
                 file: Some(name),
@@ -223,13 +242,19 @@ fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
 
 fn open_file(path: &Path) -> Result<Kind, VideoError> {
     let unreadable = |error: std::io::Error| {
-        file_error(path, format!("it cannot be read ({error}); expected a folder of frames, a Y4M file, or - for a stream; correct the path"))
+        file_error(
+            path,
+            format!(
+                "it cannot be read ({error}); expected a folder of frames, a Y4M file, or - for a stream; correct the path"
+            ),
+        )
     };
     let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
     let mut start = [0; 2];
     let read = file.read(&mut start).map_err(unreadable)?;
     if start != [0xff, 0xd8] {
-        let whole: Box<dyn Read> = Box::new(std::io::Cursor::new(start[..read].to_vec()).chain(file));
+        let whole: Box<dyn Read> =
+            Box::new(std::io::Cursor::new(start[..read].to_vec()).chain(file));
         let place = Place::File(path.into());
         return Ok(Kind::Y4m(Box::new(Y4mReader::new(whole, place)?)));
     }

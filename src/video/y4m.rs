@@ -58,7 +58,9 @@ impl Header {
             chroma: Chroma::C444,
             full_range: false,
             rate,
-            line: format!("YUV4MPEG2 W{width} H{height} F{num}:{den} Ip A1:1 C444 XCOLORRANGE=LIMITED"),
+            line: format!(
+                "YUV4MPEG2 W{width} H{height} F{num}:{den} Ip A1:1 C444 XCOLORRANGE=LIMITED"
+            ),
         }
     }
 
@@ -73,7 +75,9 @@ impl Header {
             let (key, value) = word.split_at(1);
             let side = || match value.parse::<u32>() {
                 Ok(side) if (1..=32768).contains(&side) => Ok(Some(side)),
-                _ => Err(format!("its size is {word}; expected W and H from 1 to 32768; make the stream again")),
+                _ => Err(format!(
+                    "its size is {word}; expected W and H from 1 to 32768; make the stream again"
+                )),
             };
             match key {
                 "W" => width = side()?,
@@ -191,8 +195,14 @@ impl<R: Read> Y4mReader<R> {
         }
         let wanted = self.header.frame_bytes();
         let mut planes = Vec::new();
-        let read = (&mut self.input).take(wanted as u64).read_to_end(&mut planes);
-        read.map_err(|error| self.place.error(format!("it cannot be read ({error}); expected a Y4M stream; check where it comes from")))?;
+        let read = (&mut self.input)
+            .take(wanted as u64)
+            .read_to_end(&mut planes);
+        read.map_err(|error| {
+            self.place.error(format!(
+                "it cannot be read ({error}); expected a Y4M stream; check where it comes from"
+            ))
+        })?;
         if planes.len() < wanted {
             return Err(self.place.error(format!(
                 "it is truncated: frame {number} has {} of {wanted} bytes; expected whole frames; make the stream again, then go on with the same command",
@@ -209,9 +219,11 @@ fn read_line(input: &mut impl Read, place: &Place) -> Result<Option<String>, Vid
     let mut line = Vec::new();
     let mut byte = [0];
     loop {
-        let read = input
-            .read(&mut byte)
-            .map_err(|error| place.error(format!("it cannot be read ({error}); expected a Y4M stream; check where it comes from")))?;
+        let read = input.read(&mut byte).map_err(|error| {
+            place.error(format!(
+                "it cannot be read ({error}); expected a Y4M stream; check where it comes from"
+            ))
+        })?;
         match (read, byte[0]) {
             (0, _) if line.is_empty() => return Ok(None),
             (0, _) => {

@@ -141,10 +141,17 @@ mod tests {
             let range = Range::of(&header);
             assert_eq!(range.encode(rgb).map(code), yuv);
             let back = range.decode(yuv);
-            assert!(rgb.iter().zip(back).all(|(a, b)| a.abs_diff(b) <= 1), "{rgb:?} {back:?}");
+            assert!(
+                rgb.iter().zip(back).all(|(a, b)| a.abs_diff(b) <= 1),
+                "{rgb:?} {back:?}"
+            );
         }
         let full = Range::of(&header_of("444", "XCOLORRANGE=FULL"));
-        assert_eq!(full.encode([255; 3]).map(code), [255, 128, 128], "control: another range");
+        assert_eq!(
+            full.encode([255; 3]).map(code),
+            [255, 128, 128],
+            "control: another range"
+        );
     }
 
     #[test]
@@ -156,7 +163,11 @@ mod tests {
                 .collect();
             let rgb = decode_yuv(&header, &planes);
             assert_eq!(encode_yuv(&header, &rgb, Some((&rgb, &planes))), planes);
-            assert_ne!(encode_yuv(&header, &rgb, None), planes, "control: codes out of range clip");
+            assert_ne!(
+                encode_yuv(&header, &rgb, None),
+                planes,
+                "control: codes out of range clip"
+            );
             // One pixel changed: luma elsewhere stays, and the colour of the other blocks.
             let mut changed = rgb.clone();
             changed[8] = [10, 200, 30];

@@ -47,9 +47,7 @@ fn the_table_is_complete() {
     assert_eq!(names, TESTED);
     let features: Vec<Features> = CASES
         .iter()
-        .map(|case: &Case| {
-            Features::for_scene(renderer(load(&case.text()), false).packed())
-        })
+        .map(|case: &Case| Features::for_scene(renderer(load(&case.text()), false).packed()))
         .collect();
     for (at, (flag, _)) in Features::default().flags().into_iter().enumerate() {
         for wanted in [true, false] {

@@ -38,14 +38,26 @@ fn worst(found: &[f64], expected: impl Fn(usize) -> f64) -> f64 {
 #[test]
 fn a_moving_object_and_a_moving_camera_smear_a_square_into_linear_ramps() {
     for (name, text) in [
-        ("object", format!("{CAMERA}{SQUARE}{OBJECT_MOTION}{SHUTTER}")),
-        ("camera", format!("{CAMERA}{CAMERA_MOTION}{SQUARE}{SHUTTER}")),
-        ("jittered", format!("{CAMERA}{CAMERA_MOTION}{SQUARE}{SHUTTER}sampler = \"jittered\"\n")),
+        (
+            "object",
+            format!("{CAMERA}{SQUARE}{OBJECT_MOTION}{SHUTTER}"),
+        ),
+        (
+            "camera",
+            format!("{CAMERA}{CAMERA_MOTION}{SQUARE}{SHUTTER}"),
+        ),
+        (
+            "jittered",
+            format!("{CAMERA}{CAMERA_MOTION}{SQUARE}{SHUTTER}sampler = \"jittered\"\n"),
+        ),
     ] {
         let row = mask_row(&render(&text, BackendChoice::Cpu), 12);
         let error = worst(&row, |x| smeared(x, 20.0));
         assert!(error < 0.02, "{name}: {error}");
-        assert!(worst(&row, |x| smeared(x, 16.0)) > 0.05, "control: another width");
+        assert!(
+            worst(&row, |x| smeared(x, 16.0)) > 0.05,
+            "control: another width"
+        );
     }
 }
 
@@ -54,8 +66,14 @@ fn a_moving_object_and_a_moving_camera_smear_a_square_into_linear_ramps() {
 fn a_rolling_shutter_leans_by_the_readout() {
     let rolling = "[shutter]\nexposure_secs = 0.0\nreadout_secs = 0.5\nsamples = 64\n[render]\nrays_per_pixel = 64\n";
     for (name, text) in [
-        ("object", format!("{CAMERA}{SQUARE}{OBJECT_MOTION}{rolling}")),
-        ("camera", format!("{CAMERA}{CAMERA_MOTION}{SQUARE}{rolling}")),
+        (
+            "object",
+            format!("{CAMERA}{SQUARE}{OBJECT_MOTION}{rolling}"),
+        ),
+        (
+            "camera",
+            format!("{CAMERA}{CAMERA_MOTION}{SQUARE}{rolling}"),
+        ),
     ] {
         let renderer = render(&text, BackendChoice::Cpu);
         for row in [0, 6, 12, 23] {
@@ -64,9 +82,20 @@ fn a_rolling_shutter_leans_by_the_readout() {
             let expected = 48.0 + 40.0 * seconds;
             let mask = mask_row(&renderer, row);
             let area: f64 = mask.iter().sum();
-            let centre = mask.iter().enumerate().map(|(x, m)| (x as f64 + 0.5) * m).sum::<f64>() / area;
-            assert!((area - 40.0).abs() < 0.3, "{name}: sharp, row {row}: {area}");
-            assert!((centre - expected).abs() < 0.5, "{name}, row {row}: {centre}, not {expected}");
+            let centre = mask
+                .iter()
+                .enumerate()
+                .map(|(x, m)| (x as f64 + 0.5) * m)
+                .sum::<f64>()
+                / area;
+            assert!(
+                (area - 40.0).abs() < 0.3,
+                "{name}: sharp, row {row}: {area}"
+            );
+            assert!(
+                (centre - expected).abs() < 0.5,
+                "{name}, row {row}: {centre}, not {expected}"
+            );
         }
     }
 }
@@ -74,7 +103,8 @@ fn a_rolling_shutter_leans_by_the_readout() {
 /// Exposure and readout at once: each row is a ramp of the exposure's width about its own place.
 #[test]
 fn a_rolling_shutter_with_exposure_smears_each_row_about_its_own_place() {
-    let both = "[shutter]\nexposure_secs = 0.25\nreadout_secs = 0.25\n[render]\nrays_per_pixel = 256\n";
+    let both =
+        "[shutter]\nexposure_secs = 0.25\nreadout_secs = 0.25\n[render]\nrays_per_pixel = 256\n";
     for (name, text) in [
         ("object", format!("{CAMERA}{SQUARE}{OBJECT_MOTION}{both}")),
         ("camera", format!("{CAMERA}{CAMERA_MOTION}{SQUARE}{both}")),
@@ -108,13 +138,28 @@ fn what_does_not_move_is_bit_identical_with_and_without_a_shutter() {
     for backend in backends {
         let off = render(&format!("{CAMERA}{placed}{ball}{render_text}"), backend);
         let shutter = "[shutter]\nexposure_secs = 0.5\nreadout_secs = 0.1\n[motion_blur]\n";
-        let on = render(&format!("{CAMERA}{still}{ball}{resting}{render_text}{shutter}"), backend);
+        let on = render(
+            &format!("{CAMERA}{still}{ball}{resting}{render_text}{shutter}"),
+            backend,
+        );
         assert!(!on.is_moving());
         assert!(same(off.film(), on.film()));
-        let moving = still.replace("time_secs = 1\nposition = [0, 0, 0.5]", "time_secs = 1\nposition = [0, 0, 0.6]");
-        let moved = render(&format!("{CAMERA}{moving}{ball}{resting}{render_text}{shutter}"), backend);
-        assert!(moved.is_moving() && !same(off.film(), moved.film()), "control");
-        let copies = render(&format!("{CAMERA}{moving}{ball}{resting}{render_text}{shutter}method = \"copies\"\n"), backend);
+        let moving = still.replace(
+            "time_secs = 1\nposition = [0, 0, 0.5]",
+            "time_secs = 1\nposition = [0, 0, 0.6]",
+        );
+        let moved = render(
+            &format!("{CAMERA}{moving}{ball}{resting}{render_text}{shutter}"),
+            backend,
+        );
+        assert!(
+            moved.is_moving() && !same(off.film(), moved.film()),
+            "control"
+        );
+        let copies = render(
+            &format!("{CAMERA}{moving}{ball}{resting}{render_text}{shutter}method = \"copies\"\n"),
+            backend,
+        );
         assert!(!copies.is_moving(), "the copies are no part of the rays");
     }
 }
@@ -135,12 +180,21 @@ fn moving_objects_are_the_same_on_the_gpu() {
         pixels
             .flat_map(|p| {
                 let n = f64::from(p.n.max(1));
-                [p.m_im.value().y / n, p.diff.value().y / n, p.m_ir.value().y / n, f64::from(p.m) / n]
+                [
+                    p.m_im.value().y / n,
+                    p.diff.value().y / n,
+                    p.m_ir.value().y / n,
+                    f64::from(p.m) / n,
+                ]
             })
             .collect()
     };
     let (a, b) = (values(&cpu), values(&gpu));
-    let far = a.iter().zip(&b).filter(|(a, b)| (*a - *b).abs() > 1e-4 * a.abs() + 1e-5).count();
+    let far = a
+        .iter()
+        .zip(&b)
+        .filter(|(a, b)| (*a - *b).abs() > 1e-4 * a.abs() + 1e-5)
+        .count();
     assert!(far as f64 <= 1e-3 * a.len() as f64, "{far} of {}", a.len());
     assert!(cpu.film().counts().edge > 100);
 }
@@ -148,12 +202,18 @@ fn moving_objects_are_the_same_on_the_gpu() {
 /// In parts or at once, and however often it is asked to go on.
 #[test]
 fn a_moving_scene_rendered_in_steps_is_the_same() {
-    let text = format!("{CAMERA}{SQUARE}{OBJECT_MOTION}[shutter]\nexposure_secs = 0.5\nsamples = 5\n[render]\nrays_per_pixel = 16\nbackend = \"cpu\"\n");
+    let text = format!(
+        "{CAMERA}{SQUARE}{OBJECT_MOTION}[shutter]\nexposure_secs = 0.5\nsamples = 5\n[render]\nrays_per_pixel = 16\nbackend = \"cpu\"\n"
+    );
     let whole = render(&text, BackendChoice::Cpu);
     let mut steps = Renderer::new(scene(&text), RendererOptions::default()).expect("fits");
     for _ in 0..40 {
         steps
-            .advance(mixray::renderer::Budget::Rays(96 * 24), &|| false, &mut |_| ())
+            .advance(
+                mixray::renderer::Budget::Rays(96 * 24),
+                &|| false,
+                &mut |_| (),
+            )
             .expect("renders");
     }
     assert_eq!(steps.samples(), 16);

@@ -17,7 +17,10 @@ fn drawn(copies: &Copies) -> Vec<f64> {
     let mut canvas = vec![[0.0; 4]; WIDTH * HEIGHT];
     draw_copies(&mut canvas, (WIDTH as u32, HEIGHT as u32), &layer, copies);
     let row = &canvas[4 * WIDTH..5 * WIDTH];
-    assert!(row.iter().all(|pixel| (pixel[0] - pixel[3]).abs() < 1e-6), "covered as it is white");
+    assert!(
+        row.iter().all(|pixel| (pixel[0] - pixel[3]).abs() < 1e-6),
+        "covered as it is white"
+    );
     row.iter().map(|pixel| f64::from(pixel[0])).collect()
 }
 
@@ -30,18 +33,30 @@ fn the_profile_is_the_papers() {
     let n = 20.0f64;
     for (x, found) in row.iter().enumerate() {
         // The copies stand at -10, -9 ... 9 px.
-        let covering = (-10..10).filter(|offset| (28..68).contains(&(x as i64 - offset))).count();
+        let covering = (-10..10)
+            .filter(|offset| (28..68).contains(&(x as i64 - offset)))
+            .count();
         let mut expected = 1.0 - (1.0 - 1.0 / n).powi(covering as i32);
         if (28..68).contains(&x) {
             expected = 1.0 - (1.0 - expected) * (1.0 - 0.8);
         }
-        assert!((found - expected).abs() < 1e-5, "{x}: {found}, not {expected}");
+        assert!(
+            (found - expected).abs() < 1e-5,
+            "{x}: {found}, not {expected}"
+        );
     }
     // As wide as a shutter's ramp of 20 px within a step.
-    let touched = row.iter().take(48).filter(|v| **v > 0.0 && **v < row[48] - 1e-6).count();
+    let touched = row
+        .iter()
+        .take(48)
+        .filter(|v| **v > 0.0 && **v < row[48] - 1e-6)
+        .count();
     assert!((19..=21).contains(&touched), "{touched}");
     let other = Copies::of([16.0, 0.0], &settings).expect("long enough");
-    assert!((drawn(&other)[20] - row[20]).abs() > 0.05, "control: another length");
+    assert!(
+        (drawn(&other)[20] - row[20]).abs() > 0.05,
+        "control: another length"
+    );
 }
 
 #[test]
@@ -54,11 +69,19 @@ fn the_thresholds_leave_short_and_long_motion_alone() {
         ([-150.5, 0.0], false),
         ([f32::NAN, 0.0], false),
     ] {
-        assert_eq!(Copies::of(blur, &settings).is_some(), is_blurred, "{blur:?}");
+        assert_eq!(
+            Copies::of(blur, &settings).is_some(),
+            is_blurred,
+            "{blur:?}"
+        );
     }
     let coarse = MotionBlurSettings {
         step_px: 3.0,
         ..settings
     };
-    assert_eq!(Copies::of([20.0, 0.0], &coarse).expect("long enough").count, 6, "rounded down");
+    assert_eq!(
+        Copies::of([20.0, 0.0], &coarse).expect("long enough").count,
+        6,
+        "rounded down"
+    );
 }

@@ -18,7 +18,10 @@ fn poses_and_frames_that_do_not_fit_are_refused() {
     let to = ["--frames", "in", "-o", "out"];
     folder.trajectory(3, 0.02, &[]);
     folder.refused(&to, "no pose for f_0003.png");
-    assert!(folder.frames_of("out").is_empty(), "before anything is rendered");
+    assert!(
+        folder.frames_of("out").is_empty(),
+        "before anything is rendered"
+    );
     let text = std::fs::read_to_string(folder.path("poses.json")).expect("reads");
     folder.write("poses.json", text.replace("[0,1,0,0]", "[0,1,0,NaN]"));
     folder.refused(&to, "NaN");
@@ -28,8 +31,14 @@ fn poses_and_frames_that_do_not_fit_are_refused() {
 
     std::fs::remove_file(folder.path("in/f_0002.png")).expect("removes");
     folder.refused(&to, "frame 2 is missing");
-    folder.refused(&["--frames", "in", "-o", "out", "--range", "1..3"], "frame 2 is missing");
-    folder.refused(&["--frames", "in", "-o", "out", "--range", "9..12"], "no frame of the range");
+    folder.refused(
+        &["--frames", "in", "-o", "out", "--range", "1..3"],
+        "frame 2 is missing",
+    );
+    folder.refused(
+        &["--frames", "in", "-o", "out", "--range", "9..12"],
+        "no frame of the range",
+    );
     folder.save("in/f_0002.png", 48, 36, 2);
     folder.refused(&["--frames", "in", "-o", "in"], "would be replaced");
     folder.refused(&["--frames", "none", "-o", "out"], "none");
@@ -38,11 +47,16 @@ fn poses_and_frames_that_do_not_fit_are_refused() {
     folder.refused(&to, "have one number");
     std::fs::remove_file(folder.path("in/g_0002.png")).expect("removes");
 
-    folder.write("scene.toml", format!("{BALL}[shutter]\nexposure_secs = 0.05\n"));
-    folder.write("poses.json", text.replace("\"frames_per_second\": 10, ", "").replace("]}}", "]}}"));
+    folder.write(
+        "scene.toml",
+        format!("{BALL}[shutter]\nexposure_secs = 0.05\n"),
+    );
     folder.trajectory(4, 0.02, &[]);
     let untimed = std::fs::read_to_string(folder.path("poses.json")).expect("reads");
-    folder.write("poses.json", untimed.replace("\"frames_per_second\": 10, ", ""));
+    folder.write(
+        "poses.json",
+        untimed.replace("\"frames_per_second\": 10, ", ""),
+    );
     folder.refused(&to, "--fps");
 }
 
@@ -50,7 +64,10 @@ fn poses_and_frames_that_do_not_fit_are_refused() {
 fn a_frame_of_another_size_ends_the_sequence_and_keeps_what_is_done() {
     let folder = folder();
     folder.save("in/f_0002.png", 40, 36, 2);
-    folder.refused(&["--frames", "in", "-o", "out"], "f_0002.png: it has 40 x 36 pixels");
+    folder.refused(
+        &["--frames", "in", "-o", "out"],
+        "f_0002.png: it has 40 x 36 pixels",
+    );
     assert_eq!(folder.frames_of("out").len(), 2);
 }
 
@@ -86,7 +103,11 @@ fn broken_streams_say_where() {
         child.wait_with_output().expect("ends")
     };
     assert_refused(&run(&stream[..stream.len() - 100]), "truncated: frame 3");
-    assert_eq!(folder.frames_of("out").len(), 3, "what was whole is rendered");
+    assert_eq!(
+        folder.frames_of("out").len(),
+        3,
+        "what was whole is rendered"
+    );
     assert_refused(&run(b""), "it is empty");
     assert_refused(&run(b"RIFF"), "truncated in the middle of a line");
     assert_refused(&run(b"RIFF\n"), "begin with YUV4MPEG2");

@@ -18,7 +18,10 @@ fn null_poses_pass_through_and_are_counted() {
     folder.frames(4, 0.02);
     folder.trajectory(4, 0.02, &[0, 2]);
     let said = folder.sequence(&["--frames", "in", "-o", "out"]);
-    assert!(said.contains("2 rendered") && said.contains("2 passed through"), "{said}");
+    assert!(
+        said.contains("2 rendered") && said.contains("2 passed through"),
+        "{said}"
+    );
     let (before, after) = (folder.frames_of("in"), folder.frames_of("out"));
     let same: Vec<bool> = before.iter().zip(&after).map(|(a, b)| a == b).collect();
     assert_eq!(same, [true, false, true, false]);
@@ -28,7 +31,11 @@ fn null_poses_pass_through_and_are_counted() {
 #[test]
 fn y4m_streams_go_in_and_out() {
     let folder = Folder::new();
-    folder.write("scene.toml", BALL.replace("[[real]]", "[[real]]\nname = \"floor\"").replace("-0.3, 1]", "-9, 1]"));
+    folder.write(
+        "scene.toml",
+        BALL.replace("[[real]]", "[[real]]\nname = \"floor\"")
+            .replace("-0.3, 1]", "-9, 1]"),
+    );
     folder.trajectory(3, 0.02, &[1]);
     let stream = y4m(48, 36, 3);
     let pipe = |input: &[u8]| {
@@ -39,11 +46,21 @@ fn y4m_streams_go_in_and_out() {
             .stderr(Stdio::piped())
             .spawn()
             .expect("starts");
-        child.stdin.take().expect("piped").write_all(input).expect("reads it all");
+        child
+            .stdin
+            .take()
+            .expect("piped")
+            .write_all(input)
+            .expect("reads it all");
         child.wait_with_output().expect("ends")
     };
     let output = pipe(&stream);
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     assert!(String::from_utf8_lossy(&output.stderr).contains("1 passed through"));
     let out = output.stdout;
     assert_eq!(out.len(), stream.len());
@@ -59,7 +76,10 @@ fn y4m_streams_go_in_and_out() {
     folder.write("in.y4m", &stream);
     folder.sequence(&["--frames", "in.y4m", "-o", "film.y4m"]);
     let written = std::fs::read(&file).expect("is there");
-    assert!(written.ends_with(&out[header..]), "a file holds the same frames");
+    assert!(
+        written.ends_with(&out[header..]),
+        "a file holds the same frames"
+    );
     // Read again, as any other program would.
     folder.sequence(&["--frames", "film.y4m", "-o", "again"]);
     assert_eq!(folder.frames_of("again").len(), 3);
@@ -90,7 +110,9 @@ fn an_object_stays_where_the_poses_put_it() {
             anchor: None,
         };
         renderer.set_frame(edit).expect("fits");
-        renderer.advance(Budget::Complete, &|| false, &mut |_| ()).expect("renders");
+        renderer
+            .advance(Budget::Complete, &|| false, &mut |_| ())
+            .expect("renders");
         let film = renderer.film();
         let mut sums = DVec3::ZERO;
         for (pixel, p) in film.pixels.iter().enumerate() {
@@ -101,7 +123,10 @@ fn an_object_stays_where_the_poses_put_it() {
         // The centre of a ball's picture is not the picture of its centre: the mean over its outline is.
         let outline: Vec<DVec3> = outline(pose.w_axis.truncate(), centre, 0.04);
         let mut expected = DVec3::ZERO;
-        let points: Vec<DVec3> = outline.iter().map(|p| project(&camera, *p).expect("in front")).collect();
+        let points: Vec<DVec3> = outline
+            .iter()
+            .map(|p| project(&camera, *p).expect("in front"))
+            .collect();
         for (a, b) in points.iter().zip(points.iter().cycle().skip(1)) {
             let area = a.x * b.y - b.x * a.y;
             expected += area * DVec3::new((a.x + b.x) / 3.0, (a.y + b.y) / 3.0, 1.0);
@@ -109,7 +134,10 @@ fn an_object_stays_where_the_poses_put_it() {
         let off = (sums.truncate() / sums.z - expected.truncate() / expected.z).length();
         assert!(off < 0.01, "frame {number}: {off} px");
         let ahead = project(&scene.camera, centre).expect("in front");
-        assert!(number == 0 || (sums.truncate() / sums.z - ahead.truncate()).length() > 1.0, "control: it moves");
+        assert!(
+            number == 0 || (sums.truncate() / sums.z - ahead.truncate()).length() > 1.0,
+            "control: it moves"
+        );
     }
 }
 
@@ -135,7 +163,10 @@ fn outline(eye: DVec3, centre: DVec3, radius: f64) -> Vec<DVec3> {
 #[test]
 fn known_points_of_the_webcam_videos_are_where_the_poses_put_them() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    for (name, posed) in [("webcam_chessboard_video", 109), ("webcam_marker_grid_video", 325)] {
+    for (name, posed) in [
+        ("webcam_chessboard_video", 109),
+        ("webcam_marker_grid_video", 325),
+    ] {
         let path = data.join(name).join("trajectory.json");
         if !path.exists() {
             eprintln!("SKIPPED: {} is absent", path.display());
@@ -163,14 +194,29 @@ fn known_points_of_the_webcam_videos_are_where_the_poses_put_them() {
         folder.write("scene.toml", "[camera]\n");
         let path = path.to_string_lossy().into_owned();
         let check = |more: &[&str]| {
-            let mut arguments = vec!["sequence", "scene.toml", "--trajectory", &path, "--check", "points.csv"];
+            let mut arguments = vec![
+                "sequence",
+                "scene.toml",
+                "--trajectory",
+                &path,
+                "--check",
+                "points.csv",
+            ];
             arguments.extend(more);
             folder.run(&arguments)
         };
         let output = check(&[]);
         let said = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert_eq!(output.status.code(), Some(0), "{said}{}", String::from_utf8_lossy(&output.stderr));
-        let worst = said.split("at most ").nth(1).and_then(|rest| rest.split(' ').next());
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{said}{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let worst = said
+            .split("at most ")
+            .nth(1)
+            .and_then(|rest| rest.split(' ').next());
         let worst: f64 = worst.and_then(|x| x.parse().ok()).expect("a number");
         assert!(worst < 0.01, "{said}");
         eprintln!("{name}: {}", said.trim());
@@ -178,23 +224,38 @@ fn known_points_of_the_webcam_videos_are_where_the_poses_put_them() {
             .map(|number| format!("{number},10,10,0,0,0\n"))
             .collect();
         folder.write("points.csv", seen.concat());
-        assert_eq!(check(&[]).status.code(), Some(1), "control: points that were seen elsewhere");
+        assert_eq!(
+            check(&[]).status.code(),
+            Some(1),
+            "control: points that were seen elsewhere"
+        );
     }
 }
 
 #[test]
 fn the_focus_is_pulled_over_the_range() {
     let folder = Folder::new();
-    folder.write("scene.toml", format!("{BALL}[lens]\naperture_radius_m = 0.1\nfocus_distance_m = 2\n"));
+    folder.write(
+        "scene.toml",
+        format!("{BALL}[lens]\naperture_radius_m = 0.1\nfocus_distance_m = 2\n"),
+    );
     folder.frames(3, 0.0);
     let pull = ["--frames", "in", "--focus-pull", "0.8..1.75", "-o"];
     folder.sequence(&[&pull[..], &["pulled"]].concat());
     folder.sequence(&["--frames", "in", "-o", "fixed"]);
     // The ball's front stands at 1.7 m: its edge sharpens from frame to frame.
     let width = |frames: &[(String, Vec<u8>)], number: usize| {
-        let image = image::load_from_memory(&frames[number].1).expect("decodes").into_rgb8();
-        let before = image::open(folder.path(&format!("in/f_{number:04}.png"))).expect("opens").into_rgb8();
-        image.pixels().zip(before.pixels()).filter(|(a, b)| a != b).count()
+        let image = image::load_from_memory(&frames[number].1)
+            .expect("decodes")
+            .into_rgb8();
+        let before = image::open(folder.path(&format!("in/f_{number:04}.png")))
+            .expect("opens")
+            .into_rgb8();
+        image
+            .pixels()
+            .zip(before.pixels())
+            .filter(|(a, b)| a != b)
+            .count()
     };
     let (pulled, fixed) = (folder.frames_of("pulled"), folder.frames_of("fixed"));
     assert_ne!(pulled[0].1, fixed[0].1);
@@ -207,10 +268,20 @@ fn memory_stays_flat() {
     let peak = |count: u32| -> Option<f64> {
         let folder = Folder::new();
         let ball = BALL.replace("rays_per_pixel = 4", "rays_per_pixel = 1");
-        folder.write("scene.toml", format!("{ball}[shutter]\nexposure_secs = 0.05\nsamples = 1\n"));
+        folder.write(
+            "scene.toml",
+            format!("{ball}[shutter]\nexposure_secs = 0.05\nsamples = 1\n"),
+        );
         folder.trajectory(count, 0.01, &[]);
         folder.write("in.y4m", y4m(32, 24, count));
-        folder.sequence(&["--frames", "in.y4m", "-o", "out.y4m", "--stats", "stats.json"]);
+        folder.sequence(&[
+            "--frames",
+            "in.y4m",
+            "-o",
+            "out.y4m",
+            "--stats",
+            "stats.json",
+        ]);
         let stats = std::fs::read_to_string(folder.path("stats.json")).expect("is there");
         let stats: serde_json::Value = serde_json::from_str(&stats).expect("parses");
         assert_eq!(stats["frames"]["rendered"], count);

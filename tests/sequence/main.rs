@@ -1,5 +1,6 @@
 //! Moving cameras and objects: motion blur against its analytic profiles, sequences of frames in and out.
 
+mod animation;
 mod blur;
 mod copies;
 mod errors;

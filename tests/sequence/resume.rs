@@ -9,7 +9,10 @@ fn folder() -> Folder {
     let folder = Folder::new();
     folder.write(
         "scene.toml",
-        format!("{}[shutter]\nexposure_secs = 0.05\n", BALL.replace("rays_per_pixel = 4", "rays_per_pixel = 64")),
+        format!(
+            "{}[shutter]\nexposure_secs = 0.05\n",
+            BALL.replace("rays_per_pixel = 4", "rays_per_pixel = 64")
+        ),
     );
     folder.frames(8, 0.4);
     folder.trajectory(8, 0.4, &[3]);
@@ -18,7 +21,10 @@ fn folder() -> Folder {
 
 /// Starts the sequence and kills it once `count` frames are there.
 fn kill_after(folder: &Folder, arguments: &[&str], count: usize, done: impl Fn() -> usize) {
-    let mut child = folder.command(&sequence(arguments)).spawn().expect("starts");
+    let mut child = folder
+        .command(&sequence(arguments))
+        .spawn()
+        .expect("starts");
     let begin = Instant::now();
     while done() < count && begin.elapsed() < Duration::from_secs(60) {
         std::thread::sleep(Duration::from_millis(2));
@@ -64,6 +70,9 @@ fn frames_of_a_file() {
     std::fs::write(&part, torn).expect("writes");
     let said = folder.sequence(&to);
     assert!(!said.contains(" 0 kept"), "{said}");
-    assert_eq!(std::fs::read(folder.path("killed.y4m")).expect("is there"), whole);
+    assert_eq!(
+        std::fs::read(folder.path("killed.y4m")).expect("is there"),
+        whole
+    );
     assert!(!part.exists());
 }

@@ -91,7 +91,10 @@ impl Folder {
                 }
             })
             .collect();
-        let text = format!(r#"{{"frames_per_second": 10, "frames": [{}]}}"#, frames.join(", "));
+        let text = format!(
+            r#"{{"frames_per_second": 10, "frames": [{}]}}"#,
+            frames.join(", ")
+        );
         self.write("poses.json", text);
     }
 
@@ -145,7 +148,11 @@ pub fn frames_of(folder: &Path) -> Vec<(String, Vec<u8>)> {
                 .map(|entry| entry.expect("reads").path())
                 .filter(|path| path.extension().is_some_and(|e| e == "png"))
                 .map(|path| {
-                    let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+                    let name = path
+                        .file_name()
+                        .expect("a name")
+                        .to_string_lossy()
+                        .into_owned();
                     (name, std::fs::read(&path).expect("reads"))
                 })
                 .collect()

@@ -40,7 +40,11 @@ pub(super) fn run(arguments: &Arguments, points: Option<&Path>) -> Result<Outcom
             files.trajectory.path.display()
         )));
     }
-    let source = arguments.frames.as_deref().map(FrameSource::open).transpose()?;
+    let source = arguments
+        .frames
+        .as_deref()
+        .map(FrameSource::open)
+        .transpose()?;
     let is_stream = source.as_ref().is_some_and(FrameSource::is_stream);
     let rate = known_rate(arguments, &files.trajectory, source.as_ref());
     let views = views(&files.trajectory, rate, is_stream)?;
@@ -56,7 +60,9 @@ pub(super) fn run(arguments: &Arguments, points: Option<&Path>) -> Result<Outcom
         };
         let (camera, lens) = match (files.intrinsics_of(&view), &own_camera) {
             (Some(intrinsics), _) => {
-                let size = intrinsics.size.or_else(|| source.as_ref()?.header().map(|h| (h.width, h.height)));
+                let size = intrinsics
+                    .size
+                    .or_else(|| source.as_ref()?.header().map(|h| (h.width, h.height)));
                 let size = size.unwrap_or((32768, 32768));
                 let camera = Camera {
                     width: size.0,
@@ -95,7 +101,10 @@ pub(super) fn run(arguments: &Arguments, points: Option<&Path>) -> Result<Outcom
     }
     let text = table(&errors, used, without_pose, behind);
     print(&text);
-    let worst = errors.values().flat_map(|e| e.seen.iter().copied()).fold(0.0, f64::max);
+    let worst = errors
+        .values()
+        .flat_map(|e| e.seen.iter().copied())
+        .fold(0.0, f64::max);
     Ok(match worst <= arguments.max_error {
         true => Outcome::Done,
         false => Outcome::CheckFailed,
@@ -113,7 +122,10 @@ fn own_error(camera: &Camera, lens: Option<Lens>, world: DVec3, pixel: glam::DVe
 }
 
 fn table(errors: &BTreeMap<String, Errors>, used: u64, without_pose: u64, behind: u64) -> String {
-    let mut all: Vec<f64> = errors.values().flat_map(|e| e.seen.iter().copied()).collect();
+    let mut all: Vec<f64> = errors
+        .values()
+        .flat_map(|e| e.seen.iter().copied())
+        .collect();
     all.sort_by(f64::total_cmp);
     let mut text = format!(
         "{used} points in {} frames; {without_pose} in frames without a pose, {behind} not in front of the camera\n",
@@ -131,7 +143,10 @@ fn table(errors: &BTreeMap<String, Errors>, used: u64, without_pose: u64, behind
         );
     }
     let own = errors.values().map(|e| e.own).fold(0.0, f64::max);
-    let _ = writeln!(text, "the renderer's own projection is off by at most {own:.5} px");
+    let _ = writeln!(
+        text,
+        "the renderer's own projection is off by at most {own:.5} px"
+    );
     let mut frames: Vec<(&String, f64)> = errors
         .iter()
         .filter(|(_, e)| !e.seen.is_empty())
@@ -166,11 +181,13 @@ fn frame_of(key: &EntryKey, trajectory: &Trajectory) -> FrameName {
 
 /// `frame,x_px,y_px,x_m,y_m,z_m` a line; `frame` is a number or a file name, the pixel may be empty.
 fn read_points(path: &Path) -> Result<Vec<KnownPoint>, Failure> {
-    let failure = |line: usize, problem: String| {
-        Failure(format!("{}:{line}: {problem}", path.display()))
-    };
+    let failure =
+        |line: usize, problem: String| Failure(format!("{}:{line}: {problem}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| {
-        Failure(format!("{}: it cannot be read ({error}); expected a table of points; correct the path", path.display()))
+        Failure(format!(
+            "{}: it cannot be read ({error}); expected a table of points; correct the path",
+            path.display()
+        ))
     })?;
     let mut points = Vec::new();
     for (index, line) in text.lines().enumerate() {
@@ -179,11 +196,22 @@ fn read_points(path: &Path) -> Result<Vec<KnownPoint>, Failure> {
             continue;
         }
         let [frame, x_px, y_px, x, y, z] = words.as_slice() else {
-            return Err(failure(index + 1, format!("it has {} columns; expected frame,x_px,y_px,x_m,y_m,z_m; complete the line", words.len())));
+            return Err(failure(
+                index + 1,
+                format!(
+                    "it has {} columns; expected frame,x_px,y_px,x_m,y_m,z_m; complete the line",
+                    words.len()
+                ),
+            ));
         };
         let number = |word: &str| match word.parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(x),
-            _ => Err(failure(index + 1, format!("\"{word}\" is no finite number; expected frame,x_px,y_px,x_m,y_m,z_m; correct the line"))),
+            _ => Err(failure(
+                index + 1,
+                format!(
+                    "\"{word}\" is no finite number; expected frame,x_px,y_px,x_m,y_m,z_m; correct the line"
+                ),
+            )),
         };
         let seen = match (x_px.is_empty(), y_px.is_empty()) {
             (true, true) => None,

@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::Arguments;
 use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
 use super::report::{Frames, Seconds, Stats};
-use super::Arguments;
 use crate::cli::progress::Steps;
 use crate::cli::{Failure, Outcome, interrupt, print, say};
 use crate::gpu::GpuStages;
@@ -27,7 +27,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let frames = arguments.frames.as_deref();
     let output = arguments.output.as_deref().unwrap_or(Path::new("-"));
     let frames = frames.ok_or_else(|| {
-        Failure("--frames is absent; expected a folder of pictures, a .y4m file, or -; add it".to_owned())
+        Failure(
+            "--frames is absent; expected a folder of pictures, a .y4m file, or -; add it"
+                .to_owned(),
+        )
     })?;
     refuse_same_place(frames, output)?;
     if let Some(path) = &arguments.stats {
@@ -37,7 +40,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let rate = known_rate(arguments, &files.trajectory, Some(&source));
     let views = views(&files.trajectory, rate, source.is_stream())?;
     check_frames(arguments, &source, &views)?;
-    let count = source.names().map(|names| names.iter().filter(|name| in_range(arguments, name)).count());
+    let count = source.names().map(|names| {
+        names
+            .iter()
+            .filter(|name| in_range(arguments, name))
+            .count()
+    });
     if let (Some((from, to)), None) = (arguments.focus_pull, &count)
         && arguments.range.is_none()
     {
@@ -192,10 +200,12 @@ impl Sequence<'_> {
         };
         let time_secs = view.time_secs.unwrap_or(0.0);
         let near = near(self.views, time_secs);
-        let previous = near.key_before(time_secs).map(|(time_secs, pose)| PreviousView {
-            world_from_camera: pose,
-            time_secs,
-        });
+        let previous = near
+            .key_before(time_secs)
+            .map(|(time_secs, pose)| PreviousView {
+                world_from_camera: pose,
+                time_secs,
+            });
         let lens = Lens {
             focus_distance_m: pulled_focus(self.arguments.focus_pull, self.span, name.number)
                 .or(view.focus_distance_m)
@@ -284,7 +294,9 @@ impl Sequence<'_> {
         frame: &VideoFrame,
         header: Option<Header>,
     ) -> Result<Started, Failure> {
-        let mut scene = self.files.scene(self.arguments, view, Some(frame.photo.clone()))?;
+        let mut scene = self
+            .files
+            .scene(self.arguments, view, Some(frame.photo.clone()))?;
         check_rate(&scene, self.rate, self.views.have_own_times())?;
         let size = (frame.photo.width, frame.photo.height);
         // The photograph of the moment is no part of what the frames are made with.
@@ -295,11 +307,17 @@ impl Sequence<'_> {
             true => format!("{:?} {:?}", arguments.range, self.span),
             false => String::new(),
         };
-        let trajectory = format!("{:?} {:?} {:?}", self.files.trajectory, self.files.intrinsics, self.rate);
+        let trajectory = format!(
+            "{:?} {:?} {:?}",
+            self.files.trajectory, self.files.intrinsics, self.rate
+        );
         let fingerprint = fingerprint_of([
             env!("CARGO_PKG_VERSION"),
             &scene.fingerprint(),
-            &format!("{:?} {:?} {:?}", scene.settings, scene.stages, arguments.png_bits),
+            &format!(
+                "{:?} {:?} {:?}",
+                scene.settings, scene.stages, arguments.png_bits
+            ),
             &trajectory,
             &format!("{:?} {scope}", arguments.focus_pull),
         ]);
@@ -328,7 +346,11 @@ impl Sequence<'_> {
         let Some(started) = self.started else {
             return Err(Failure(format!(
                 "{}: no frame of the range was found; expected at least one; correct --range",
-                self.arguments.frames.as_deref().unwrap_or(Path::new("-")).display()
+                self.arguments
+                    .frames
+                    .as_deref()
+                    .unwrap_or(Path::new("-"))
+                    .display()
             )));
         };
         if outcome == Outcome::Done {
@@ -352,7 +374,13 @@ impl Sequence<'_> {
             print(&text);
         }
         if stats.non_finite_samples > 0 {
-            say("warning", &format!("{} samples were not finite and are left out", stats.non_finite_samples));
+            say(
+                "warning",
+                &format!(
+                    "{} samples were not finite and are left out",
+                    stats.non_finite_samples
+                ),
+            );
         }
         Ok(outcome)
     }

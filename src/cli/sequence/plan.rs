@@ -7,7 +7,7 @@ use crate::cli::{Failure, say};
 use crate::scene::trajectory::{
     FrameName, FrameView, Intrinsics, Trajectory, Views, read_intrinsics,
 };
-use crate::scene::{self, Given, Photo, Scene};
+use crate::scene::{self, Given, Object, Photo, Scene};
 use crate::video::FrameSource;
 
 /// Frames a second that stand for an unknown rate, where nothing depends on it but which frame follows which.
@@ -78,8 +78,12 @@ pub(super) fn views<'a>(
 }
 
 /// The scene depends on time, so that the rate has to be known.
-pub(super) fn check_rate(scene: &Scene, rate: Option<f64>, views_have_times: bool) -> Result<(), Failure> {
-    let timed = scene.shutter.is_some() || scene.objects.iter().any(|object| object.motion.is_some());
+pub(super) fn check_rate(
+    scene: &Scene,
+    rate: Option<f64>,
+    views_have_times: bool,
+) -> Result<(), Failure> {
+    let timed = scene.shutter.is_some() || scene.objects.iter().any(Object::is_animated);
     if timed && rate.is_none() && !views_have_times {
         return Err(Failure(
             "the scene has [shutter] or moving objects, but nothing tells the frames' times; expected a frame rate; give --fps".to_owned(),
@@ -111,9 +115,7 @@ pub(super) fn check_frames(
         )));
     };
     if !arguments.allow_gaps {
-        let (from, to) = arguments
-            .range
-            .unwrap_or((first.number, last.number + 1));
+        let (from, to) = arguments.range.unwrap_or((first.number, last.number + 1));
         let mut numbers = wanted.iter().map(|name| name.number).peekable();
         for number in from..to {
             if numbers.next_if_eq(&number).is_none() {

@@ -15,8 +15,8 @@ use crate::gpu::kernel::reflect_bindings;
 use crate::gpu::{Composer, Features};
 use crate::math::{hash_combine, uniform_from_bits};
 use crate::scene::{
-    AntialiasSettings, CartoonSettings, CartoonStyle, MotionBlurSettings, NoiseFit, NoiseMethod, NoiseProfile,
-    NoiseSettings,
+    AntialiasSettings, CartoonSettings, CartoonStyle, MotionBlurSettings, NoiseFit, NoiseMethod,
+    NoiseProfile, NoiseSettings,
 };
 use crate::stages::EncodedImage;
 use crate::stages::antialias::antialias;
@@ -166,7 +166,8 @@ fn the_copies_are_the_same() {
     let worst = apart(&on_cpu, &on_gpu);
     assert!(worst < 1e-5, "{worst}");
     let mut other = canvas.clone();
-    gpu.draw_copies(&mut other, SIZE, &layers[..2]).expect("runs");
+    gpu.draw_copies(&mut other, SIZE, &layers[..2])
+        .expect("runs");
     assert!(apart(&on_cpu, &other) > 0.01, "control: a layer less");
 }
 

@@ -1,6 +1,9 @@
 //! Scene files that were damaged at random: whatever is done to a valid file, it loads or is refused in one line with its place.
 
-use super::super::{error::Source, file::{Given, read_scene}};
+use super::super::{
+    error::Source,
+    file::{Given, read_scene},
+};
 use crate::math::{hash_combine, hash_u32};
 
 const VALID: &str = r#"

@@ -120,7 +120,10 @@ fn read_image(
     let words: Vec<&str> = line.split_whitespace().collect();
     let form = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME";
     if words.len() < 10 {
-        return Err(format!("it has {} words; expected {form}; complete the line", words.len()));
+        return Err(format!(
+            "it has {} words; expected {form}; complete the line",
+            words.len()
+        ));
     }
     let [qw, qx, qy, qz, x, y, z] = numbers::<7>(&words[1..8], form)?;
     let camera_from_world =
@@ -130,7 +133,10 @@ fn read_image(
         .ok()
         .and_then(|camera| cameras.get(&camera))
         .ok_or_else(|| {
-            format!("camera {} is not in cameras.txt; expected one of its cameras; export both again", words[8])
+            format!(
+                "camera {} is not in cameras.txt; expected one of its cameras; export both again",
+                words[8]
+            )
         })?;
     let name = words[9..].join(" ");
     let file = Path::new(&name).file_name().unwrap_or_default();
@@ -155,7 +161,10 @@ fn read_observations(
     let mut known = Vec::new();
     for triple in words.chunks(3) {
         let [x, y, id] = triple else {
-            return Err("its observations are no triples; expected X Y POINT3D_ID; export the model again".to_owned());
+            return Err(
+                "its observations are no triples; expected X Y POINT3D_ID; export the model again"
+                    .to_owned(),
+            );
         };
         let pixel = numbers::<2>(&[x, y], "X Y POINT3D_ID")?;
         if let Some(world) = id.parse::<i64>().ok().and_then(|id| points.get(&id)) {

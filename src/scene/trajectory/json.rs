@@ -17,17 +17,21 @@ const POSE_KEYS: &[&str] = &[
 type Problem<T> = std::result::Result<T, String>;
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Trajectory> {
-    let document: Value = serde_json::from_str(text).map_err(|error| super::TrajectoryError::Line {
-        path: path.into(),
-        line: error.line(),
-        message: syntax_problem(text, &error),
-    })?;
+    let document: Value =
+        serde_json::from_str(text).map_err(|error| super::TrajectoryError::Line {
+            path: path.into(),
+            line: error.line(),
+            message: syntax_problem(text, &error),
+        })?;
     read_document(path, &document).map_err(|message| file_error(path, message))
 }
 
 /// Python writes NaN and Infinity, which JSON does not have.
 fn syntax_problem(text: &str, error: &serde_json::Error) -> String {
-    let line = text.lines().nth(error.line().saturating_sub(1)).unwrap_or("");
+    let line = text
+        .lines()
+        .nth(error.line().saturating_sub(1))
+        .unwrap_or("");
     for word in ["NaN", "Infinity"] {
         if line.contains(word) {
             return format!(
@@ -40,22 +44,29 @@ fn syntax_problem(text: &str, error: &serde_json::Error) -> String {
 
 fn read_document(path: &Path, document: &Value) -> Problem<Trajectory> {
     let Some(root) = document.as_object() else {
-        return Err("it is no JSON object; expected a list `frames` in one; correct the file".to_owned());
+        return Err(
+            "it is no JSON object; expected a list `frames` in one; correct the file".to_owned(),
+        );
     };
     let Some(frames) = root.get("frames").and_then(Value::as_array) else {
-        return Err("it lacks the list `frames`; expected one entry for each frame; add it".to_owned());
+        return Err(
+            "it lacks the list `frames`; expected one entry for each frame; add it".to_owned(),
+        );
     };
     let rate = ["frames_per_second", "nominal_fps"]
         .iter()
         .find_map(|key| root.get(*key).map(|value| number(value, key)))
         .transpose()?;
     if rate.is_some_and(|rate| rate <= 0.0) {
-        return Err("the frame rate is not above 0; expected frames per second; correct it".to_owned());
+        return Err(
+            "the frame rate is not above 0; expected frames per second; correct it".to_owned(),
+        );
     }
     let mut entries = Vec::with_capacity(frames.len());
     for (index, frame) in frames.iter().enumerate() {
         let place = format!("frames[{index}]");
-        let entry = read_entry(frame, place.clone()).map_err(|problem| format!("{place}: {problem}"))?;
+        let entry =
+            read_entry(frame, place.clone()).map_err(|problem| format!("{place}: {problem}"))?;
         entries.push(entry);
     }
     Ok(Trajectory {
@@ -86,12 +97,17 @@ fn read_entry(frame: &Value, place: String) -> Problem<Entry> {
             .map(EntryKey::Number)
             .ok_or("`frame` is no frame number; expected a whole number from 0; correct it")?,
         (None, Some(name)) => {
-            let name = name.as_str().ok_or("its file name is no string; expected one; correct it")?;
+            let name = name
+                .as_str()
+                .ok_or("its file name is no string; expected one; correct it")?;
             let file = Path::new(name).file_name().unwrap_or_default();
             EntryKey::Name(file.to_string_lossy().into_owned())
         }
         (None, None) => {
-            return Err("it says not which frame it is; expected `frame` or `file_path`; add one".to_owned());
+            return Err(
+                "it says not which frame it is; expected `frame` or `file_path`; add one"
+                    .to_owned(),
+            );
         }
     };
     let optional = |key: &str| frame.get(key).map(|value| number(value, key)).transpose();
@@ -115,7 +131,10 @@ fn read_pose(pose: &Value) -> Problem<Option<DMat4>> {
         return Ok(None);
     }
     let shape = "the pose is no matrix; expected 4 rows of 4 numbers, or null; correct it";
-    let rows = pose.as_array().filter(|rows| rows.len() == 4).ok_or(shape)?;
+    let rows = pose
+        .as_array()
+        .filter(|rows| rows.len() == 4)
+        .ok_or(shape)?;
     let mut matrix = [[0.0; 4]; 4];
     for (numbers, row) in matrix.iter_mut().zip(rows) {
         let row = row.as_array().filter(|row| row.len() == 4).ok_or(shape)?;
@@ -129,7 +148,9 @@ fn read_pose(pose: &Value) -> Problem<Option<DMat4>> {
 fn number(value: &Value, what: &str) -> Problem<f64> {
     match value.as_f64() {
         Some(x) => finite(x, what),
-        None => Err(format!("{what} is {value}; expected a finite number; correct it")),
+        None => Err(format!(
+            "{what} is {value}; expected a finite number; correct it"
+        )),
     }
 }
 
@@ -150,7 +171,9 @@ fn read_intrinsics(table: &Map<String, Value>) -> Problem<Option<Intrinsics>> {
 fn required(table: &Map<String, Value>, key: &str) -> Problem<f64> {
     match table.get(key) {
         Some(value) => number(value, key),
-        None => Err(format!("the intrinsics lack `{key}`; expected it in pixels; add it")),
+        None => Err(format!(
+            "the intrinsics lack `{key}`; expected it in pixels; add it"
+        )),
     }
 }
 
@@ -203,9 +226,21 @@ fn coefficients(table: &Map<String, Value>) -> Problem<[f64; 5]> {
 
 /// nerfstudio takes COLMAP's principal point, whose origin is the corner.
 fn nerfstudio_intrinsics(table: &Map<String, Value>) -> Problem<Intrinsics> {
-    let model = table.get("camera_model").and_then(Value::as_str).unwrap_or("OPENCV");
+    let model = table
+        .get("camera_model")
+        .and_then(Value::as_str)
+        .unwrap_or("OPENCV");
     let k4 = table.get("k4").and_then(Value::as_f64).unwrap_or(0.0);
-    if !["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "RADIAL", "SIMPLE_RADIAL"].contains(&model) || k4 != 0.0 {
+    if ![
+        "OPENCV",
+        "PINHOLE",
+        "SIMPLE_PINHOLE",
+        "RADIAL",
+        "SIMPLE_RADIAL",
+    ]
+    .contains(&model)
+        || k4 != 0.0
+    {
         return Err(format!(
             "the camera model {model} with k4 = {k4} is not known; expected OPENCV or PINHOLE without k4; undistort the frames"
         ));

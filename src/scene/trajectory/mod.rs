@@ -237,9 +237,9 @@ fn numbers<const N: usize>(words: &[&str], what: &str) -> std::result::Result<[f
         ));
     }
     for (value, word) in values.iter_mut().zip(words) {
-        let parsed = word.parse::<f64>().map_err(|_| {
-            format!("\"{word}\" is no number; expected {what}; correct the line")
-        })?;
+        let parsed = word
+            .parse::<f64>()
+            .map_err(|_| format!("\"{word}\" is no number; expected {what}; correct the line"))?;
         *value = finite(parsed, what)?;
     }
     Ok(values)
@@ -263,10 +263,7 @@ fn from_opencv_axes(world_from_camera: DMat4) -> DMat4 {
 }
 
 /// A unit quaternion x, y, z, w of nearly unit length, and a position.
-fn pose_of_quaternion(
-    quaternion: DQuat,
-    position: DVec3,
-) -> std::result::Result<DMat4, String> {
+fn pose_of_quaternion(quaternion: DQuat, position: DVec3) -> std::result::Result<DMat4, String> {
     let length = quaternion.length();
     if (length - 1.0).abs() > 1e-2 {
         return Err(format!(

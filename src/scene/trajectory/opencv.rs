@@ -22,7 +22,9 @@ pub fn read_intrinsics(path: &Path) -> Result<Intrinsics> {
     let lacks = |what: &str| {
         file_error(
             path,
-            format!("it lacks `{what}`; expected a calibration as OpenCV writes it; export it again"),
+            format!(
+                "it lacks `{what}`; expected a calibration as OpenCV writes it; export it again"
+            ),
         )
     };
     let (line, words) = matrix(&text, MATRIX_KEYS).ok_or_else(|| lacks(MATRIX_KEYS[0]))?;
@@ -53,7 +55,9 @@ pub fn read_intrinsics(path: &Path) -> Result<Intrinsics> {
         }
     }
     let side = |key: &str| {
-        let value = text.lines().find_map(|line| line.trim().strip_prefix(key)?.strip_prefix(':'));
+        let value = text
+            .lines()
+            .find_map(|line| line.trim().strip_prefix(key)?.strip_prefix(':'));
         value.and_then(|value| value.trim().parse::<u32>().ok())
     };
     Ok(Intrinsics {

@@ -4,7 +4,9 @@ use std::collections::HashMap;
 
 use glam::DMat4;
 
-use super::{CameraPath, Entry, EntryKey, Intrinsics, Result, Trajectory, TrajectoryError, file_error};
+use super::{
+    CameraPath, Entry, EntryKey, Intrinsics, Result, Trajectory, TrajectoryError, file_error,
+};
 
 /// A frame as its source names it.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,7 +101,10 @@ impl<'a> Views<'a> {
 
     /// Every entry tells its time.
     pub fn have_own_times(&self) -> bool {
-        self.trajectory.entries.iter().all(|entry| entry.time_secs.is_some())
+        self.trajectory
+            .entries
+            .iter()
+            .all(|entry| entry.time_secs.is_some())
     }
 
     /// Seconds from one frame to the next, where known.
@@ -144,7 +149,9 @@ impl<'a> Views<'a> {
             }
             None => (self.by_key.get(&numbered).copied()).or_else(|| {
                 let name = self.names.get(frame.number as usize)?;
-                self.by_key.get(&EntryKey::Name((*name).to_owned())).copied()
+                self.by_key
+                    .get(&EntryKey::Name((*name).to_owned()))
+                    .copied()
             }),
         }
     }

@@ -74,7 +74,10 @@ fn json_of_three_programs_is_one_pose() {
     assert_eq!(view.focus_distance_m, Some(0.7));
     let intrinsics = view.intrinsics.expect("given");
     assert_eq!((intrinsics.cx, intrinsics.size), (320.0, Some((640, 480))));
-    assert_eq!(views.of(&frame(None, 6)).expect("null").world_from_camera, None);
+    assert_eq!(
+        views.of(&frame(None, 6)).expect("null").world_from_camera,
+        None
+    );
     assert!(views.of(&frame(None, 7)).is_err(), "absent");
 
     let tracked = folder
@@ -88,7 +91,11 @@ fn json_of_three_programs_is_one_pose() {
         .expect("reads");
     assert_pose(tracked.entries[0].world_from_camera, pose());
     let intrinsics = tracked.intrinsics.expect("given");
-    assert_eq!((intrinsics.cx, intrinsics.cy), (320.0, 240.0), "half a pixel");
+    assert_eq!(
+        (intrinsics.cx, intrinsics.cy),
+        (320.0, 240.0),
+        "half a pixel"
+    );
     assert_eq!(intrinsics.distortion[0], 0.1);
 
     let nerfstudio = folder
@@ -105,7 +112,9 @@ fn json_of_three_programs_is_one_pose() {
     assert_eq!(intrinsics.distortion, [0.05, 0.0, 0.0, 0.01, 0.0]);
     assert_eq!((intrinsics.fy, intrinsics.cx), (502.0, 320.0));
     let views = Views::new(&nerfstudio, Some(10.0), false).expect("no doubles");
-    let view = views.of(&frame(Some("frame_00001.png"), 1)).expect("converted");
+    let view = views
+        .of(&frame(Some("frame_00001.png"), 1))
+        .expect("converted");
     assert_pose(view.world_from_camera, pose());
     assert_eq!(view.time_secs, Some(0.1));
     let views = Views::new(&nerfstudio, Some(10.0), true).expect("no doubles");
@@ -124,15 +133,39 @@ fn own_toml_is_strict() {
     let own = folder.read("own.toml", &text).expect("reads");
     let views = Views::new(&own, None, false).expect("no doubles");
     for number in [0, 1] {
-        assert_pose(views.of(&frame(None, number)).expect("there").world_from_camera, pose());
+        assert_pose(
+            views
+                .of(&frame(None, number))
+                .expect("there")
+                .world_from_camera,
+            pose(),
+        );
     }
-    assert_eq!(views.of(&frame(None, 1)).expect("there").time_secs, Some(0.15));
-    assert_eq!(views.of(&frame(None, 2)).expect("null").world_from_camera, None);
+    assert_eq!(
+        views.of(&frame(None, 1)).expect("there").time_secs,
+        Some(0.15)
+    );
+    assert_eq!(
+        views.of(&frame(None, 2)).expect("null").world_from_camera,
+        None
+    );
     let entry = "[[frame]]\nframe = 0\n";
     for (text, part) in [
-        (format!("{entry}world_from_camera = {}", ROWS.replace("[0, 1, 0, 2]", "[0, nan, 0, 2]")), ":3:"),
+        (
+            format!(
+                "{entry}world_from_camera = {}",
+                ROWS.replace("[0, 1, 0, 2]", "[0, nan, 0, 2]")
+            ),
+            ":3:",
+        ),
         (entry.to_owned(), "pose is absent"),
-        (format!("{entry}world_from_camera = {}", ROWS.replace("0, 0, -1", "0, 0, -2")), "not rigid"),
+        (
+            format!(
+                "{entry}world_from_camera = {}",
+                ROWS.replace("0, 0, -1", "0, 0, -2")
+            ),
+            "not rigid",
+        ),
         (format!("{entry}pose = \"none\""), "null"),
         (format!("{entry}world_from_camra = {ROWS}"), "did you mean"),
         (String::new(), "no pose"),
@@ -146,23 +179,51 @@ fn own_toml_is_strict() {
 #[test]
 fn json_refusals_name_the_frame() {
     let folder = Folder::new();
-    let entry = |rest: &str| format!(r#"{{"frames": [{{"frame": 0, "world_from_camera": {ROWS}}}, {{"frame": 1{rest}}}]}}"#);
+    let entry = |rest: &str| {
+        format!(
+            r#"{{"frames": [{{"frame": 0, "world_from_camera": {ROWS}}}, {{"frame": 1{rest}}}]}}"#
+        )
+    };
     for (text, part) in [
         (entry(""), "frames[1]: its pose is absent"),
         (entry(r#", "world_from_camera": [[NaN, 0, 0, 0]]"#), "NaN"),
-        (entry(r#", "world_from_camera": [[1, 0, 0, 0]]"#), "4 rows of 4"),
-        (entry(r#", "world_from_camera": [[1,0,0,0],[0,1,0,0],[0,0,1,"x"],[0,0,0,1]]"#), "frames[1]"),
-        (entry(&format!(r#", "world_from_camera": {}"#, ROWS.replace("1, 0, 0, 3", "1, 0, 0.1, 3"))), "not rigid"),
-        (entry(r#", "world_from_camera": [[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"#), "mirrors"),
+        (
+            entry(r#", "world_from_camera": [[1, 0, 0, 0]]"#),
+            "4 rows of 4",
+        ),
+        (
+            entry(r#", "world_from_camera": [[1,0,0,0],[0,1,0,0],[0,0,1,"x"],[0,0,0,1]]"#),
+            "frames[1]",
+        ),
+        (
+            entry(&format!(
+                r#", "world_from_camera": {}"#,
+                ROWS.replace("1, 0, 0, 3", "1, 0, 0.1, 3")
+            )),
+            "not rigid",
+        ),
+        (
+            entry(r#", "world_from_camera": [[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"#),
+            "mirrors",
+        ),
         ("{\"frames\": [".to_owned(), "valid JSON"),
         ("{}".to_owned(), "`frames`"),
-        (r#"{"fl_x": 5, "cx": 1, "cy": 1, "camera_model": "OPENCV_FISHEYE", "frames": []}"#.to_owned(), "OPENCV_FISHEYE"),
+        (
+            r#"{"fl_x": 5, "cx": 1, "cy": 1, "camera_model": "OPENCV_FISHEYE", "frames": []}"#
+                .to_owned(),
+            "OPENCV_FISHEYE",
+        ),
     ] {
         folder.refused("bad.json", &text, part);
     }
-    let twice = format!(r#"{{"frames": [{{"frame": 3, "world_from_camera": {ROWS}}}, {{"frame": 3, "world_from_camera": null}}]}}"#);
+    let twice = format!(
+        r#"{{"frames": [{{"frame": 3, "world_from_camera": {ROWS}}}, {{"frame": 3, "world_from_camera": null}}]}}"#
+    );
     let twice = folder.read("twice.json", &twice).expect("reads");
-    let message = Views::new(&twice, None, false).err().expect("doubles").to_string();
+    let message = Views::new(&twice, None, false)
+        .err()
+        .expect("doubles")
+        .to_string();
     assert!(message.contains("frames[0] and frames[1]"), "{message}");
 }
 
@@ -202,10 +263,19 @@ fn colmap_and_tum_turn_their_axes() {
     let tum = folder.read("tum.txt", &tum).expect("reads");
     assert_pose(tum.entries[0].world_from_camera, pose());
     let views = Views::new(&tum, None, false).expect("no doubles");
-    assert_pose(views.of(&frame(Some("a.png"), 0)).expect("in order").world_from_camera, pose());
+    assert_pose(
+        views
+            .of(&frame(Some("a.png"), 0))
+            .expect("in order")
+            .world_from_camera,
+        pose(),
+    );
     let between = views.of(&frame(Some("10.05.png"), 0)).expect("by time");
     assert!((between.world_from_camera.expect("posed").w_axis.x - 2.0).abs() < 1e-9);
-    assert!(views.of(&frame(Some("11.05.png"), 0)).is_err(), "no pose near");
+    assert!(
+        views.of(&frame(Some("11.05.png"), 0)).is_err(),
+        "no pose near"
+    );
 
     folder.refused("tum.txt", "1 0 0 0 0 0 0\n", "complete the line");
     folder.refused("tum.txt", "1 0 0 nan 0 0 0 1\n", "NaN");
@@ -214,8 +284,13 @@ fn colmap_and_tum_turn_their_axes() {
     folder.refused("images.txt", "1 1 0 0 0 0 0 nan 1 a.png\n\n", "NaN");
     folder.refused("images.txt", "1 1 0 0 0 0 0 0 9 a.png\n\n", "camera 9");
     folder.write("cameras.txt", "1 FISHEYE 640 480 1 2 3\n");
-    let message = Trajectory::read(folder.0.path()).expect_err("unknown").to_string();
-    assert!(message.contains("cameras.txt:1") && message.contains("FISHEYE"), "{message}");
+    let message = Trajectory::read(folder.0.path())
+        .expect_err("unknown")
+        .to_string();
+    assert!(
+        message.contains("cameras.txt:1") && message.contains("FISHEYE"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -228,13 +303,18 @@ fn opencv_calibrations_are_read() {
     assert_eq!((intrinsics.cx, intrinsics.cy), (320.0, 240.0));
     assert_eq!(intrinsics.distortion, [0.1, -0.2, 0.01, 0.02, 0.3]);
     for (text, part) in [
-        (yaml.replace("camera_matrix", "matrix"), "lacks `camera_matrix`"),
+        (
+            yaml.replace("camera_matrix", "matrix"),
+            "lacks `camera_matrix`",
+        ),
         (yaml.replace("501.", ".nan"), "calib.yml:5"),
         (yaml.replace("501.", "nan"), "NaN"),
         (yaml.replace("500., 0.", "500., 3."), "no skew"),
         (yaml.replace("0.3 ]", "0.3, 0.7 ]"), "coefficient 6"),
     ] {
-        let message = read_intrinsics(&folder.write("calib.yml", &text)).expect_err(part).to_string();
+        let message = read_intrinsics(&folder.write("calib.yml", &text))
+            .expect_err(part)
+            .to_string();
         assert!(message.contains(part), "{message} lacks {part}");
     }
 }
@@ -247,8 +327,16 @@ fn the_camera_moves_at_constant_rates_between_poses() {
     let path = CameraPath::new(vec![(1.0, turned(40.0, 2.0)), (0.0, turned(0.0, 0.0))]);
     assert_pose(path.pose(0.25), turned(10.0, 0.5));
     assert_pose(path.pose(-0.5), turned(-20.0, -1.0));
-    assert_eq!(path.pose(0.0), Some(turned(0.0, 0.0)), "a key is itself, to the bit");
-    assert_eq!(path.around(0.0, 0.5).pose(0.2), Some(turned(0.0, 0.0)), "no neighbour, no motion");
+    assert_eq!(
+        path.pose(0.0),
+        Some(turned(0.0, 0.0)),
+        "a key is itself, to the bit"
+    );
+    assert_eq!(
+        path.around(0.0, 0.5).pose(0.2),
+        Some(turned(0.0, 0.0)),
+        "no neighbour, no motion"
+    );
     let still = CameraPath::new(vec![(0.0, pose()), (1.0, pose())]);
     assert_eq!(still.pose(0.3), Some(pose()));
     assert_eq!(CameraPath::default().pose(0.0), None);

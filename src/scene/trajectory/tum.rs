@@ -17,8 +17,12 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Trajectory> {
         }
         let number = index + 1;
         let words: Vec<&str> = line.split_whitespace().collect();
-        let entry = read_line(&words, number).map_err(|problem| line_error(path, number, problem))?;
-        if entries.last().is_some_and(|before| before.time_secs >= entry.time_secs) {
+        let entry =
+            read_line(&words, number).map_err(|problem| line_error(path, number, problem))?;
+        if entries
+            .last()
+            .is_some_and(|before| before.time_secs >= entry.time_secs)
+        {
             return Err(line_error(
                 path,
                 number,
