@@ -47,8 +47,9 @@ struct Frame {
 const FRAME_ENV_DRAWN: u32 = 1u;
 const FRAME_AOVS: u32 = 2u;
 const FRAME_ALPHA: u32 = 4u;
-const FRAME_SHUTTER: u32 = 8u;
-const FRAME_SHUTTER_ORDERED: u32 = 16u;
+const FRAME_LIGHTS_SUFFICE: u32 = 8u;
+const FRAME_SHUTTER: u32 = 16u;
+const FRAME_SHUTTER_ORDERED: u32 = 32u;
 
 struct Vertex {
     position_u0: vec4<f32>,

@@ -203,6 +203,7 @@ fn constants_have_the_same_values_on_both_sides() {
         FRAME_ENV_DRAWN,
         FRAME_AOVS,
         FRAME_ALPHA,
+        FRAME_LIGHTS_SUFFICE,
         FRAME_SHUTTER,
         FRAME_SHUTTER_ORDERED,
         SHUTTER_POSES,
