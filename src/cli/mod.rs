@@ -11,6 +11,7 @@ mod info;
 mod interrupt;
 mod layers;
 mod merge;
+mod motion_blur;
 mod noise;
 mod progress;
 mod render;
@@ -44,6 +45,7 @@ enum Command {
     Cartoon(cartoon::Arguments),
     Noise(noise::Arguments),
     Antialias(antialias::Arguments),
+    MotionBlur(motion_blur::Arguments),
     Compare(compare::Arguments),
     Info(info::Arguments),
 }
@@ -76,6 +78,7 @@ pub fn run() -> ExitCode {
         Command::Cartoon(arguments) => cartoon::run(&arguments),
         Command::Noise(arguments) => noise::run(&arguments),
         Command::Antialias(arguments) => antialias::run(&arguments),
+        Command::MotionBlur(arguments) => motion_blur::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
     };

@@ -10,7 +10,7 @@ use crate::film::{Film, MergeError};
 use crate::gpu::Changed;
 use crate::packed::{FRAME_SHUTTER, PackedScene, instants, next_anchor, row_ends};
 use crate::scene::trajectory::CameraPath;
-use crate::scene::{Camera, Lens, Photo};
+use crate::scene::{Camera, Exposure, Lens, Photo};
 
 /// The next frame of a video.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub struct FrameEdit {
 
 impl Renderer {
     /// Goes on to another frame of the same scene. The real world and its BVH stay, and the virtual ones unless objects have moved; the
-    /// film starts anew.
+    /// film starts anew. An exposure that was fitted to the first photograph is kept.
     ///
     /// # Errors
     /// The frame is of another size, or as [`Renderer::new`].
@@ -44,6 +44,10 @@ impl Renderer {
             if (width, height) != size {
                 return Err(MergeError::Size(size.0, size.1, width, height).into());
             }
+        }
+        if self.scene.settings.exposure == Exposure::Auto {
+            let scale = f64::from(self.packed.frame.exposure_scale);
+            self.scene.settings.exposure = Exposure::Ev(scale.log2());
         }
         if let Some(photo) = edit.photo {
             self.scene.photo = Some(photo);

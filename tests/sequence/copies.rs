@@ -1,7 +1,10 @@
 //! The paper's copies, against its own formula.
 
+use image::{Rgb, RgbImage};
 use mixray::scene::MotionBlurSettings;
 use mixray::stages::copies::{Copies, draw_copies};
+
+use super::support::Folder;
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 8;
@@ -84,4 +87,63 @@ fn the_thresholds_leave_short_and_long_motion_alone() {
         6,
         "rounded down"
     );
+}
+
+/// A layer of another program, over a photograph.
+#[test]
+fn layers_of_other_programs_are_blurred() {
+    let folder = Folder::new();
+    let grey = |name: &str, value: fn(u32) -> u8| {
+        let picture = RgbImage::from_fn(96, 8, |x, _| Rgb([value(x); 3]));
+        picture.save(folder.path(name)).expect("saves");
+    };
+    grey("photo.png", |_| 0);
+    grey("layer.png", |_| 255);
+    grey("mask.png", |x| if (28..68).contains(&x) { 255 } else { 0 });
+    let done = |vector: &str, out: &str| {
+        let output = folder.run(&[
+            "motion-blur",
+            "photo.png",
+            "layer.png",
+            "mask.png",
+            "--vector",
+            vector,
+            "-o",
+            out,
+        ]);
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        image::open(folder.path(out)).expect("opens").into_rgb8()
+    };
+    let blurred = done("-20,0", "out.png");
+    let settings = MotionBlurSettings::default();
+    let row = drawn(&Copies::of([-20.0, 0.0], &settings).expect("long enough"));
+    for (x, expected) in row.iter().enumerate() {
+        let expected = mixray::scene::srgb::encode8(*expected as f32);
+        assert!(
+            blurred.get_pixel(x as u32, 4).0[0].abs_diff(expected) <= 1,
+            "{x}"
+        );
+    }
+    let sharp = done("3,0", "sharp.png");
+    assert_eq!(
+        (sharp.get_pixel(27, 4).0[0], sharp.get_pixel(28, 4).0[0]),
+        (0, 255),
+        "control: too short"
+    );
+    let output = folder.run(&[
+        "motion-blur",
+        "photo.png",
+        "layer.png",
+        "mask.png",
+        "--vector",
+        "x",
+        "-o",
+        "out.png",
+    ]);
+    assert_eq!(output.status.code(), Some(2));
 }

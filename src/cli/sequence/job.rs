@@ -1,5 +1,6 @@
 //! The frames one after the other.
 
+use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
@@ -307,9 +308,10 @@ impl Sequence<'_> {
             true => format!("{:?} {:?}", arguments.range, self.span),
             false => String::new(),
         };
+        let poses = &self.files.trajectory;
         let trajectory = format!(
-            "{:?} {:?} {:?}",
-            self.files.trajectory, self.files.intrinsics, self.rate
+            "{:?} {:?} {:?} {:?}",
+            poses.entries, poses.intrinsics, self.files.intrinsics, self.rate
         );
         let fingerprint = fingerprint_of([
             env!("CARGO_PKG_VERSION"),
@@ -368,8 +370,8 @@ impl Sequence<'_> {
         }
         let text = stats.text(&self.output.display().to_string());
         if self.output == Path::new("-") {
-            // Standard output is the film.
-            eprint!("{text}");
+            // Standard output is the film. Without a stderr there is nobody to tell.
+            let _ = std::io::stderr().write_all(text.as_bytes());
         } else {
             print(&text);
         }
