@@ -2,6 +2,7 @@
 
 const NONE: u32 = 0xffffffffu;
 const MAX_SPHERES: u32 = 16u;
+const SHUTTER_POSES: u32 = 9u;
 
 struct Frame {
     camera_position: vec4<f32>,
@@ -36,16 +37,19 @@ struct Frame {
     virtual_node_base: u32,
     virtual_leaf_base: u32,
     clamp_indirect: f32,
-    pad_0: f32,
-    pad_1: f32,
-    pad_2: f32,
+    shutter_row: f32,
+    shutter_open: f32,
+    pad: f32,
     spheres: array<vec4<f32>, 16>,
+    shutter_poses: array<vec4<f32>, 18>,
 }
 
 const FRAME_ENV_DRAWN: u32 = 1u;
 const FRAME_AOVS: u32 = 2u;
 const FRAME_ALPHA: u32 = 4u;
 const FRAME_LIGHTS_SUFFICE: u32 = 8u;
+const FRAME_SHUTTER: u32 = 16u;
+const FRAME_SHUTTER_ORDERED: u32 = 32u;
 
 struct Vertex {
     position_u0: vec4<f32>,

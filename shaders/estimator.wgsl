@@ -1,14 +1,15 @@
 // The estimator as a state machine. Rust twin: src/cpu/estimator.rs, where the method is described.
 
-import package::bindings::{NONE, frame, pixels, FRAME_AOVS, FRAME_ENV_DRAWN, PIXEL_BEAM_MAY_MEET_VIRTUAL};
+import package::bindings::{NONE, frame, pixels, FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PIXEL_BEAM_MAY_MEET_VIRTUAL};
 import package::bsdf::bsdf_albedo;
 import package::cones::cone_pdf;
 import package::contribution::{accumulate, density_weight, sample_key};
 import package::environment::env_radiance;
-import package::lens::camera_ray;
+import package::lens::camera_ray_from;
 import package::lights::env_arriving;
 import package::math::{dot3, hash_combine, hash_u32};
 import package::sampler::sample_4d;
+import package::shutter::{camera_pose, camera_pose_at, shutter_share};
 import package::state::{
     COINCIDENCE, DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_REAL,
     PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_REAL,
@@ -52,7 +53,13 @@ fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
     let u = sample_4d(sample_key(&st), 0u);
     let x = f32(pixel % frame.width) + u.x;
     let y = f32(pixel / frame.width) + u.y;
-    let ray = camera_ray(x, y, u.z, u.w);
+    var pose = camera_pose();
+    @if(shutter) {
+        if (frame.flags & FRAME_SHUTTER) != 0u {
+            pose = camera_pose_at(shutter_share(sample_key(&st), index, pixel / frame.width));
+        }
+    }
+    let ray = camera_ray_from(pose, x, y, u.z, u.w);
     st.position = ray.origin;
     st.direction = ray.direction;
     if is_real_pass {

@@ -2,6 +2,7 @@
 
 import package::bindings::frame;
 import package::math::{dot3, normalize3, sincos_2pi};
+import package::shutter::{CameraPose, camera_pose};
 
 const APERTURE_DISC: u32 = 0u;
 const APERTURE_SQUARE: u32 = 1u;
@@ -58,22 +59,23 @@ fn sample_lens(u: f32, v: f32) -> vec2<f32> {
 }
 
 fn camera_ray(px: f32, py: f32, lens_u: f32, lens_v: f32) -> CameraRay {
+    return camera_ray_from(camera_pose(), px, py, lens_u, lens_v);
+}
+
+fn camera_ray_from(pose: CameraPose, px: f32, py: f32, lens_u: f32, lens_v: f32) -> CameraRay {
     let ideal = lens_undistort(
         (px - frame.intrinsics.z) / frame.intrinsics.x,
         (py - frame.intrinsics.w) / frame.intrinsics.y,
     );
-    let position = frame.camera_position.xyz;
-    let right = frame.camera_right.xyz;
-    let up = frame.camera_up.xyz;
-    let d = right * ideal.x - (up * ideal.y + frame.camera_back.xyz);
+    let d = pose.right * ideal.x - (pose.up * ideal.y + pose.back);
     @if(lens) {
         if frame.aperture_radius != 0.0 {
             let at = sample_lens(lens_u, lens_v);
-            let offset = right * at.x + up * at.y;
-            return CameraRay(position + offset, normalize3(d - offset * frame.inv_focus_distance));
+            let offset = pose.right * at.x + pose.up * at.y;
+            return CameraRay(pose.position + offset, normalize3(d - offset * frame.inv_focus_distance));
         }
     }
-    return CameraRay(position, normalize3(d));
+    return CameraRay(pose.position, normalize3(d));
 }
 
 fn camera_project(position: vec3<f32>) -> Projection {

@@ -35,3 +35,4 @@ pub mod report;
 pub mod scene;
 pub mod stages;
 pub mod stress;
+pub mod video;

@@ -52,7 +52,14 @@ pub fn soft_edge() -> Result<()> {
         let mut renderer = Renderer::new(scene::load(&path)?, RendererOptions::default())?;
         renderer.advance(Budget::Complete, &|| false, &mut |_| ())?;
         let plain = renderer.picture();
-        let finished = finish(plain.clone(), renderer.film(), renderer.scene(), 0, None);
+        let finished = finish(
+            plain.clone(),
+            renderer.film(),
+            renderer.scene(),
+            0,
+            None,
+            None,
+        );
         for (name, picture) in [("off", &plain), ("on", &finished.picture)] {
             let levels = levels(picture, &plain);
             let cells: Vec<String> = levels.iter().map(|level| format!("{level:.2}")).collect();

@@ -139,7 +139,7 @@ pub fn noise() -> Result<()> {
         let mut copies: Vec<_> = (0..=REPEATS).map(|_| picture.clone()).collect();
         let times = timed(|| {
             if let Some(picture) = copies.pop() {
-                finish(picture, renderer.film(), &scene, 0, None);
+                finish(picture, renderer.film(), &scene, 0, None, None);
             }
             Ok(())
         })?;

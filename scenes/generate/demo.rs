@@ -188,10 +188,12 @@ fn things() -> Vec<Thing> {
 
 fn object(thing: Thing) -> Object {
     Object {
+        motion: None,
         name: thing.name.to_owned(),
         side: Side::Real,
         world_from_object: DMat4::IDENTITY,
         instances: vec![Instance {
+            animation: None,
             object_from_local: DMat4::IDENTITY,
             primitive: Arc::new(thing.mesh.to_primitive(thing.name)),
             material: Arc::new(thing.material),

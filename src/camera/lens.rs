@@ -6,6 +6,7 @@
 use glam::{DVec3, Vec3};
 
 use super::distortion;
+use super::shutter::{CameraPose, camera_pose};
 use crate::math::{dot3, normalize3, sincos_2pi};
 use crate::packed::Frame;
 use crate::scene::{Aperture, Camera, Lens};
@@ -111,23 +112,32 @@ pub fn sample_lens(frame: &Frame, u: f32, v: f32) -> [f32; 2] {
 /// The ray of photograph position (px, py), pixels from the top left corner, through the lens point of (lens_u, lens_v).
 /// With an aperture radius of 0 the lens numbers are not looked at.
 pub fn camera_ray(frame: &Frame, px: f32, py: f32, lens_u: f32, lens_v: f32) -> CameraRay {
+    camera_ray_from(frame, &camera_pose(frame), px, py, lens_u, lens_v)
+}
+
+/// [`camera_ray`] of a camera that stands at `pose`.
+pub fn camera_ray_from(
+    frame: &Frame,
+    pose: &CameraPose,
+    px: f32,
+    py: f32,
+    lens_u: f32,
+    lens_v: f32,
+) -> CameraRay {
     let [fx, fy, cx, cy] = frame.intrinsics;
     let ideal = lens_undistort(frame, (px - cx) / fx, (py - cy) / fy);
-    let position = xyz(frame.camera_position);
-    let right = xyz(frame.camera_right);
-    let up = xyz(frame.camera_up);
     // At depth 1 along the view axis; pixel y runs down. Grouped: a shader compiler regroups a - b - c as it likes.
-    let d = right * ideal[0] - (up * ideal[1] + xyz(frame.camera_back));
+    let d = pose.right * ideal[0] - (pose.up * ideal[1] + pose.back);
     if frame.aperture_radius == 0.0 {
         return CameraRay {
-            origin: position,
+            origin: pose.position,
             direction: normalize3(d),
         };
     }
     let at = sample_lens(frame, lens_u, lens_v);
-    let offset = right * at[0] + up * at[1];
+    let offset = pose.right * at[0] + pose.up * at[1];
     CameraRay {
-        origin: position + offset,
+        origin: pose.position + offset,
         direction: normalize3(d - offset * frame.inv_focus_distance),
     }
 }

@@ -3,6 +3,7 @@
 pub mod distortion;
 pub mod lens;
 pub mod sampler;
+pub mod shutter;
 
 #[cfg(test)]
 pub mod chi_squared;

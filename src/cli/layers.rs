@@ -176,6 +176,18 @@ struct Plane {
 }
 
 impl Layers {
+    /// The layer's colour times the mask, and the mask.
+    pub(super) fn premultiplied(&self) -> Vec<[f32; 4]> {
+        let pixels = self.picture.linear.iter().zip(&self.photo.linear);
+        pixels
+            .zip(&self.mask)
+            .map(|((both, photo), m)| {
+                let [r, g, b] = [0, 1, 2].map(|c| both[c] - (1.0 - m) * photo[c]);
+                [r, g, b, *m]
+            })
+            .collect()
+    }
+
     pub(super) fn bits(&self) -> PngBits {
         PngBits::for_photo(Some(&self.photo))
     }

@@ -11,9 +11,11 @@ mod info;
 mod interrupt;
 mod layers;
 mod merge;
+mod motion_blur;
 mod noise;
 mod progress;
 mod render;
+mod sequence;
 mod stage_device;
 mod stress;
 mod summary;
@@ -37,11 +39,13 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(render::Arguments),
+    Sequence(sequence::Arguments),
     Merge(merge::Arguments),
     Bench(bench::Arguments),
     Cartoon(cartoon::Arguments),
     Noise(noise::Arguments),
     Antialias(antialias::Arguments),
+    MotionBlur(motion_blur::Arguments),
     Compare(compare::Arguments),
     Info(info::Arguments),
 }
@@ -68,11 +72,13 @@ impl<E: std::error::Error> From<E> for Failure {
 pub fn run() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
+        Command::Sequence(arguments) => sequence::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
         Command::Bench(arguments) => arguments.check().and_then(bench::run),
         Command::Cartoon(arguments) => cartoon::run(&arguments),
         Command::Noise(arguments) => noise::run(&arguments),
         Command::Antialias(arguments) => antialias::run(&arguments),
+        Command::MotionBlur(arguments) => motion_blur::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
     };

@@ -14,7 +14,8 @@ use crate::output::{
 };
 use crate::renderer::{Budget, Renderer, RendererOptions, Skip, Stats, Without};
 use crate::scene::{
-    self, BackendChoice, Choice, Composite, Estimator, Overrides, SamplerKind, Settings,
+    self, BackendChoice, Choice, Composite, Estimator, MotionBlurMethod, Overrides, SamplerKind,
+    Settings,
 };
 use crate::stages::finish;
 
@@ -214,8 +215,17 @@ pub(super) fn write(
         renderer.film(),
         renderer.scene(),
         frame,
+        None,
         gpu.as_ref(),
     );
+    if (renderer.scene().stages.motion_blur)
+        .is_some_and(|settings| settings.method == MotionBlurMethod::Copies)
+    {
+        say(
+            "note",
+            "[motion_blur] copies are left out: they go along the motion since the frame before, which `mixray sequence` knows",
+        );
+    }
     for note in &finished.notes {
         say("note", note);
     }

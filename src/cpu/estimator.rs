@@ -10,14 +10,17 @@ use super::contribution::*;
 use super::state::*;
 use super::vertex::shade_vertex;
 use crate::accel::Hit;
-use crate::camera::lens::camera_ray;
+use crate::camera::lens::camera_ray_from;
 use crate::camera::sampler::sample_4d;
+use crate::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
 use crate::light::cones::{Cones, cone_pdf};
 use crate::light::environment::env_radiance;
 use crate::light::lights::env_arriving;
 use crate::material::{Surface, bsdf_albedo, surface_at};
 use crate::math::{hash_combine, hash_u32};
-use crate::packed::{FRAME_AOVS, FRAME_ENV_DRAWN, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene};
+use crate::packed::{
+    FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene,
+};
 
 /// Sets the turns' offset apart from the sampler's streams, which hash the same numbers.
 const TURN_SALT: u32 = 0x7f4a_7c15;
@@ -76,7 +79,13 @@ pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool
     let u = sample_4d(sample_key(scene, &st), 0);
     let x = (pixel % scene.frame.width) as f32 + u[0];
     let y = (pixel / scene.frame.width) as f32 + u[1];
-    let ray = camera_ray(&scene.frame, x, y, u[2], u[3]);
+    let mut pose = camera_pose(&scene.frame);
+    if scene.frame.flags & FRAME_SHUTTER != 0 {
+        let key = sample_key(scene, &st);
+        let share = shutter_share(&scene.frame, key, index, pixel / scene.frame.width);
+        pose = camera_pose_at(&scene.frame, share);
+    }
+    let ray = camera_ray_from(&scene.frame, &pose, x, y, u[2], u[3]);
     st.position = ray.origin;
     st.direction = ray.direction;
     if real_pass {

@@ -21,8 +21,8 @@ pub fn render_pass(scene: &PackedScene, film: &mut Film, pass: Pass, cancel: &Ca
     let totals = AtomicTotals::default();
     let first_ray = film.first_sample;
     let selected: Vec<bool> = match pass {
-        Pass::Main { .. } => Vec::new(),
-        Pass::Real { everywhere } => (0..film.pixels.len())
+        Pass::Main { .. } | Pass::MainRows { .. } => Vec::new(),
+        Pass::Real { everywhere } | Pass::RealRows { everywhere, .. } => (0..film.pixels.len())
             .map(|i| film.needs_real(i) || (everywhere && wants_real(&film.pixels[i])))
             .collect(),
     };
@@ -53,12 +53,13 @@ pub fn render_pass(scene: &PackedScene, film: &mut Film, pass: Pass, cancel: &Ca
                 let pixel = tile * TILE_PIXELS + i;
                 let factor = scene.pixels[pixel].sample_factor;
                 let first_sample = first_ray * factor;
+                let row = pixel / scene.frame.width as usize;
+                let end = pass.end_of_row(row).saturating_mul(factor);
                 match pass {
-                    Pass::Main { end } => {
+                    Pass::Main { .. } | Pass::MainRows { .. } => {
                         if scene.pixels[pixel].flags & PIXEL_OUT_OF_REACH != 0 {
                             continue;
                         }
-                        let end = end * factor;
                         while first_sample + sums.n < end {
                             let index = first_sample + sums.n;
                             let idle = samples_without_turn(scene, pixel as u32, index, end);
@@ -74,11 +75,11 @@ pub fn render_pass(scene: &PackedScene, film: &mut Film, pass: Pass, cancel: &Ca
                             main_sample(scene, pixel as u32, index, sums, guide, &mut counts);
                         }
                     }
-                    Pass::Real { .. } => {
+                    Pass::Real { .. } | Pass::RealRows { .. } => {
                         if !selected[pixel] {
                             continue;
                         }
-                        while sums.n_real < sums.n {
+                        while sums.n_real < sums.n && first_sample + sums.n_real < end {
                             let index = first_sample + sums.n_real;
                             let st = run(
                                 scene,

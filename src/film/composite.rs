@@ -92,6 +92,25 @@ pub fn composite_pixel(sums: &PixelSums, ic: [f32; 3], mode: Composite) -> [f32;
     value.as_vec3().to_array()
 }
 
+/// What the pixel shows where nothing virtual covers it: the photograph with the shadows and reflections that its real samples found.
+pub fn background_pixel(sums: &PixelSums, ic: [f32; 3], mode: Composite) -> [f32; 3] {
+    let real = sums.n - sums.m;
+    let diff_sum = sums.diff.value();
+    if real == 0 || diff_sum == DVec3::ZERO {
+        return ic;
+    }
+    let photo = Vec3::from(ic).as_dvec3();
+    let value = match mode {
+        Composite::Quotient if sums.n_real > 0 => {
+            let means = Means::of(sums);
+            let real = means.r_ir.max(DVec3::splat(QUOTIENT_EPSILON));
+            photo * (DVec3::ONE + means.diff / real)
+        }
+        _ => photo + diff_sum / f64::from(real),
+    };
+    value.as_vec3().to_array()
+}
+
 struct Means {
     mask: f64,
     m_im: DVec3,

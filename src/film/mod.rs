@@ -9,7 +9,8 @@ mod sums;
 pub use accumulation::{Film, MergeError, PixelCounts, PixelKind};
 pub use compare::{Comparison, SizeMismatch, compare};
 pub use composite::{
-    Picture, Planes, QUOTIENT_EPSILON, composite, estimated_error, planes, variance,
+    Picture, Planes, QUOTIENT_EPSILON, background_pixel, composite, estimated_error, planes,
+    variance,
 };
 pub use flip::{flip, flip_map};
 pub use sums::{

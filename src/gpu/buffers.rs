@@ -5,6 +5,16 @@ use bytemuck::Zeroable;
 use super::{GpuDevice, GpuError};
 use crate::packed::{Frame, Light, Material, PackedScene, PixelInfo, TextureRef, Triangle, Vertex};
 
+/// What an edit has changed in a packed scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Changed {
+    /// Camera, lens, sampling, and what the photograph tells of the albedo.
+    View,
+    /// The virtual world and the lights too.
+    Virtual,
+    All,
+}
+
 /// The arrays of a packed scene, any of them possibly empty; `From` a packed scene: all of them.
 #[derive(Clone, Copy)]
 pub struct SceneParts<'a> {
@@ -77,22 +87,7 @@ impl SceneBuffers {
     /// # Errors
     /// [`GpuError::Limit`] for an array that the adapter cannot bind or hold.
     pub fn from_parts(gpu: &GpuDevice, parts: &SceneParts<'_>) -> Result<Self, GpuError> {
-        let [real_nodes, virtual_nodes] = parts.bvh_nodes.map(bytemuck::cast_slice);
-        let [real_leaves, virtual_leaves] = parts.bvh_leaves.map(bytemuck::cast_slice);
-        let arrays: [(&str, [&[u8]; 2]); 12] = [
-            ("triangles", one(parts.triangles)),
-            ("vertices", one(parts.vertices)),
-            ("materials", one(parts.materials)),
-            ("textures", one(parts.texture_refs)),
-            ("texels", one(parts.texels)),
-            ("lights", one(parts.lights)),
-            ("environment map", one(parts.env_texels)),
-            ("environment table", one(parts.env_cdf)),
-            ("albedo of the photograph", one(parts.photo_albedo)),
-            ("pixels", one(parts.pixels)),
-            ("BVH nodes", [real_nodes, virtual_nodes]),
-            ("BVH triangles", [real_leaves, virtual_leaves]),
-        ];
+        let arrays = arrays(parts).map(|(what, _, bytes)| (what, bytes));
         for (what, [first, second]) in &arrays {
             check_size(gpu, what, (first.len() + second.len()) as u64)?;
         }
@@ -114,6 +109,25 @@ impl SceneBuffers {
         Ok(scene)
     }
 
+    /// Sends what has changed, where the buffers have room for it; false, and nothing is sent, where they have not.
+    pub fn update(&self, gpu: &GpuDevice, parts: &SceneParts<'_>, changed: Changed) -> bool {
+        let arrays = arrays(parts);
+        let fits = |(buffer, (_, _, [first, second])): (&wgpu::Buffer, &(_, _, [&[u8]; 2]))| {
+            (first.len() + second.len()) as u64 <= buffer.size()
+        };
+        if changed == Changed::All || !self.buffers[1..].iter().zip(&arrays).all(fits) {
+            return false;
+        }
+        for (buffer, (_, of, [first, second])) in self.buffers[1..].iter().zip(&arrays) {
+            if *of == Changed::View || *of == changed {
+                gpu.queue.write_buffer(buffer, 0, first);
+                gpu.queue.write_buffer(buffer, first.len() as u64, second);
+            }
+        }
+        self.write_frame(gpu, &with_bases(parts));
+        true
+    }
+
     /// Replaces camera, lens and sampling; the arrays stay.
     fn write_frame(&self, gpu: &GpuDevice, frame: &Frame) {
         gpu.queue
@@ -124,6 +138,27 @@ impl SceneBuffers {
     pub fn get(&self, binding: u32) -> Option<&wgpu::Buffer> {
         self.buffers.get(binding as usize)
     }
+}
+
+/// Each array by binding, with the smallest edit that changes it.
+fn arrays<'a>(parts: &SceneParts<'a>) -> [(&'static str, Changed, [&'a [u8]; 2]); 12] {
+    let [real_nodes, virtual_nodes] = parts.bvh_nodes.map(bytemuck::cast_slice);
+    let [real_leaves, virtual_leaves] = parts.bvh_leaves.map(bytemuck::cast_slice);
+    use Changed::{All, View, Virtual};
+    [
+        ("triangles", Virtual, one(parts.triangles)),
+        ("vertices", Virtual, one(parts.vertices)),
+        ("materials", Virtual, one(parts.materials)),
+        ("textures", All, one(parts.texture_refs)),
+        ("texels", All, one(parts.texels)),
+        ("lights", Virtual, one(parts.lights)),
+        ("environment map", All, one(parts.env_texels)),
+        ("environment table", All, one(parts.env_cdf)),
+        ("albedo of the photograph", View, one(parts.photo_albedo)),
+        ("pixels", View, one(parts.pixels)),
+        ("BVH nodes", Virtual, [real_nodes, virtual_nodes]),
+        ("BVH triangles", Virtual, [real_leaves, virtual_leaves]),
+    ]
 }
 
 /// Nodes are five vec4 each, leaves three a triangle.

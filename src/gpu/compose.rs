@@ -36,6 +36,7 @@ pub const MODULES: &[(&str, &str)] = &[
     ("rectangle", include_str!("../../shaders/rectangle.wgsl")),
     ("request", include_str!("../../shaders/request.wgsl")),
     ("sampler", include_str!("../../shaders/sampler.wgsl")),
+    ("shutter", include_str!("../../shaders/shutter.wgsl")),
     ("state", include_str!("../../shaders/state.wgsl")),
     (
         "stages_antialias",
@@ -44,6 +45,10 @@ pub const MODULES: &[(&str, &str)] = &[
     (
         "stages_cartoon",
         include_str!("../../shaders/stages_cartoon.wgsl"),
+    ),
+    (
+        "stages_copies",
+        include_str!("../../shaders/stages_copies.wgsl"),
     ),
     (
         "stages_curve",
@@ -119,6 +124,8 @@ features! {
     paper,
     /// Some material has a GGX lobe.
     rough_specular,
+    /// The camera moves while the shutter is open.
+    shutter,
 }
 
 impl Features {
@@ -161,6 +168,7 @@ impl Features {
             }),
             paper: scene.frame.estimator == 1,
             rough_specular: material(&|m| m.flags & no_lobe == 0),
+            shutter: scene.frame.flags & packed::FRAME_SHUTTER != 0,
         }
     }
 }

@@ -15,7 +15,7 @@ mod profile;
 pub mod stages;
 pub mod wavefront;
 
-pub use buffers::{SceneBuffers, SceneParts};
+pub use buffers::{Changed, SceneBuffers, SceneParts};
 pub use compose::{Composer, Features};
 pub use device::{AdapterChoice, AdapterReport, GpuDevice, list_adapters};
 pub use profile::KernelSeconds;

@@ -228,6 +228,16 @@ const TRACES: &[Trace] = &[
         ..ADVANCE
     },
     Trace {
+        feature: "shutter",
+        kernel: "kernel_generate",
+        with: &[
+            "fn shutter_shutter_share",
+            "fn shutter_camera_pose_at",
+            "bindings_frame.shutter_poses",
+        ],
+        ..ADVANCE
+    },
+    Trace {
         feature: "rough_specular",
         with: &[
             "fn ggx_",

@@ -12,7 +12,7 @@ use super::pacer::Pacer;
 use super::profile::{
     ACCUMULATE, ADVANCE, GENERATE, KERNELS, KernelSeconds, Profiler, TRACE, TURN,
 };
-use super::{Composer, Features, GpuDevice, GpuError, SceneBuffers, SceneParts};
+use super::{Changed, Composer, Features, GpuDevice, GpuError, SceneBuffers, SceneParts};
 use crate::film::Film;
 use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
 use crate::renderer::{Cancel, Pass, RayTotals};
@@ -54,6 +54,8 @@ pub struct GpuBackend {
     scene: SceneBuffers,
     features: Features,
     kernels: Vec<Kernel>,
+    /// Kernels of other features that were in use before.
+    parked: Vec<Parked>,
     /// Bytes of the state of one sample.
     path_bytes: u64,
     lanes: Option<Lanes>,
@@ -66,6 +68,33 @@ pub struct GpuBackend {
     batches_until_loss: Option<u32>,
     /// The kernels hold no more than the scene needs.
     specialised: bool,
+}
+
+struct Parked {
+    features: Features,
+    kernels: Vec<Kernel>,
+}
+
+fn compile(
+    gpu: &GpuDevice,
+    composer: &Composer,
+    features: &Features,
+) -> Result<Vec<Kernel>, GpuError> {
+    KERNELS
+        .iter()
+        .map(|entry_point| {
+            let wgsl = composer.compose("kernels", entry_point, features)?;
+            Kernel::new(gpu, entry_point, &wgsl)
+        })
+        .collect()
+}
+
+fn path_bytes(kernels: &[Kernel]) -> u64 {
+    kernels[ADVANCE]
+        .bindings()
+        .iter()
+        .find(|binding| (binding.group, binding.binding) == (1, 2))
+        .map_or(16, |binding| u64::from(binding.stride))
 }
 
 /// One dispatch of a submission.
@@ -100,14 +129,46 @@ impl GpuBackend {
     /// # Errors
     /// As [`GpuBackend::new`].
     pub fn set_scene(&mut self, scene: &PackedScene) -> Result<(), GpuError> {
+        self.update_scene(scene, Changed::All)
+    }
+
+    /// [`GpuBackend::set_scene`] where no more than `changed` is new since the last time: the rest is not sent again.
+    ///
+    /// # Errors
+    /// As [`GpuBackend::new`].
+    pub fn update_scene(&mut self, scene: &PackedScene, changed: Changed) -> Result<(), GpuError> {
+        let parts = SceneParts::from(scene);
+        if !self.scene.update(&self.gpu, &parts, changed) {
+            self.scene = SceneBuffers::from_parts(&self.gpu, &parts)?;
+            // Bind groups name the old buffers.
+            self.lanes = None;
+        }
         let features = Features::wanted(scene, self.specialised);
         if features != self.features {
-            *self = Self::new(Arc::clone(&self.gpu), scene, self.specialised)?;
-            return Ok(());
+            self.change_features(features)?;
         }
-        self.scene = SceneBuffers::from_parts(&self.gpu, &SceneParts::from(scene))?;
-        // Bind groups name the old buffers.
+        Ok(())
+    }
+
+    /// Takes other kernels, compiled now or kept from before: a video goes back and forth between moving and resting.
+    fn change_features(&mut self, features: Features) -> Result<(), GpuError> {
+        let kept = (self.parked.iter()).position(|parked| parked.features == features);
+        let kernels = match kept {
+            Some(kept) => self.parked.swap_remove(kept).kernels,
+            None => compile(&self.gpu, &Composer::default(), &features)?,
+        };
+        let before = Parked {
+            features: std::mem::replace(&mut self.features, features),
+            kernels: std::mem::replace(&mut self.kernels, kernels),
+        };
+        self.parked.push(before);
+        let path_bytes = path_bytes(&self.kernels);
+        if path_bytes != self.path_bytes {
+            self.path_bytes = path_bytes;
+            self.pacer = Pacer::new(most_lanes(&self.gpu, path_bytes));
+        }
         self.lanes = None;
+        self.warm = false;
         Ok(())
     }
 
@@ -121,24 +182,15 @@ impl GpuBackend {
         features: &Features,
         scene: SceneBuffers,
     ) -> Result<Self, GpuError> {
-        let kernels = KERNELS
-            .iter()
-            .map(|entry_point| {
-                let wgsl = composer.compose("kernels", entry_point, features)?;
-                Kernel::new(&gpu, entry_point, &wgsl)
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        let path_bytes = kernels[ADVANCE]
-            .bindings()
-            .iter()
-            .find(|binding| (binding.group, binding.binding) == (1, 2))
-            .map_or(16, |binding| u64::from(binding.stride));
+        let kernels = compile(&gpu, composer, features)?;
+        let path_bytes = path_bytes(&kernels);
         let pacer = Pacer::new(most_lanes(&gpu, path_bytes));
         Ok(Self {
             gpu,
             scene,
             features: *features,
             kernels,
+            parked: Vec::new(),
             path_bytes,
             lanes: None,
             groups: Vec::new(),
@@ -221,8 +273,12 @@ impl GpuBackend {
         rays: &mut RayTotals,
     ) -> Result<(), GpuError> {
         let (real_pass, work) = match pass {
-            Pass::Main { end } => (false, main_work(&scene.pixels, film, end)),
-            Pass::Real { everywhere } => (true, real_work(film, everywhere)),
+            Pass::Main { .. } | Pass::MainRows { .. } => {
+                (false, main_work(&scene.pixels, film, &pass))
+            }
+            Pass::Real { everywhere } | Pass::RealRows { everywhere, .. } => {
+                (true, real_work(film, everywhere, &pass))
+            }
         };
         if cancel.is_cancelled() {
             return Ok(());
@@ -487,11 +543,12 @@ impl GpuBackend {
 }
 
 /// The samples that every pixel within reach of something virtual still lacks.
-pub(super) fn main_work(pixels: &[PixelInfo], film: &Film, end: u32) -> Vec<PixelWork> {
+pub(super) fn main_work(pixels: &[PixelInfo], film: &Film, pass: &Pass) -> Vec<PixelWork> {
     let mut work: Vec<PixelWork> = (0..film.pixels.len())
         .filter(|&pixel| pixels[pixel].flags & PIXEL_OUT_OF_REACH == 0)
         .map(|pixel| {
             let next = film.first_index(pixel) + film.pixels[pixel].n;
+            let end = pass.end_of_row(pixel / film.width as usize);
             PixelWork::new(pixel as u32, next..film.end_index(pixel, end))
         })
         .filter(|work| work.len() > 0)
@@ -502,7 +559,7 @@ pub(super) fn main_work(pixels: &[PixelInfo], film: &Film, end: u32) -> Vec<Pixe
 }
 
 /// The real samples that edge pixels lack; `everywhere`: those of all pixels that are not wholly virtual.
-pub(super) fn real_work(film: &Film, everywhere: bool) -> Vec<PixelWork> {
+pub(super) fn real_work(film: &Film, everywhere: bool, pass: &Pass) -> Vec<PixelWork> {
     film.pixels
         .iter()
         .enumerate()
@@ -511,8 +568,11 @@ pub(super) fn real_work(film: &Film, everywhere: bool) -> Vec<PixelWork> {
         })
         .map(|(pixel, sums)| {
             let first = film.first_index(pixel);
-            PixelWork::new(pixel as u32, first + sums.n_real..first + sums.n)
+            let end = pass.end_of_row(pixel / film.width as usize);
+            let end = film.end_index(pixel, end).min(first + sums.n);
+            PixelWork::new(pixel as u32, first + sums.n_real..end)
         })
+        .filter(|work| work.len() > 0)
         .collect()
 }
 

@@ -10,6 +10,7 @@ use super::wavefront::{main_work, real_work};
 use super::*;
 use crate::film::{Film, Guide, Sample};
 use crate::packed::{Frame, PIXEL_OUT_OF_REACH, PixelInfo};
+use crate::renderer::Pass;
 
 const STATE: &str = "
 const STAGE_DONE: u32 = 0u;
@@ -317,10 +318,19 @@ fn a_pass_asks_for_what_each_pixel_lacks() {
     pixels[3].flags = PIXEL_OUT_OF_REACH;
     let work = |pixel, samples| PixelWork::new(pixel, samples);
     assert_eq!(
-        main_work(&pixels, &film, 14),
+        main_work(&pixels, &film, &Pass::Main { end: 14 }),
         [work(0, 10..14), work(1, 13..14), work(2, 13..14)]
     );
-    assert_eq!(main_work(&pixels, &film, 13), [work(0, 10..13)]);
-    assert_eq!(real_work(&film, false), [work(1, 10..13)]);
-    assert_eq!(real_work(&film, true), [work(1, 10..13), work(2, 10..13)]);
+    assert_eq!(
+        main_work(&pixels, &film, &Pass::Main { end: 13 }),
+        [work(0, 10..13)]
+    );
+    assert_eq!(
+        real_work(&film, false, &Pass::Real { everywhere: false }),
+        [work(1, 10..13)]
+    );
+    assert_eq!(
+        real_work(&film, true, &Pass::Real { everywhere: true }),
+        [work(1, 10..13), work(2, 10..13)]
+    );
 }

@@ -12,6 +12,7 @@ pub use channels::ChannelFile;
 pub use exr_file::{Metadata, write_exr};
 pub use film_file::{FilmNote, read_film, write_film};
 pub use plain::{write_composite, write_image};
+pub(crate) use png_file::picture_codes8;
 pub use png_file::{PngBits, write_png};
 pub use reference_file::write_reference;
 pub use target::{Format, Target, write_bytes, write_text};

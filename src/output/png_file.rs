@@ -37,10 +37,7 @@ pub fn write_png(
 ) -> Result<(), OutputError> {
     let (bytes, color) = match bits {
         PngBits::Eight => {
-            let codes = codes(picture, photo, encode8, |encoded, pixel| match encoded {
-                EncodedPhoto::Srgb8(codes) => Some(codes[pixel]),
-                _ => None,
-            });
+            let codes = picture_codes8(picture, photo);
             (codes.into_flattened(), ExtendedColorType::Rgb8)
         }
         PngBits::Sixteen => {
@@ -60,6 +57,14 @@ pub fn write_png(
                 path: target.path().into(),
                 message: e.to_string(),
             })
+    })
+}
+
+/// sRGB codes of 8 bits as [`write_png`] writes them.
+pub(crate) fn picture_codes8(picture: &Picture, photo: Option<&Photo>) -> Vec<[u8; 3]> {
+    codes(picture, photo, encode8, |encoded, pixel| match encoded {
+        EncodedPhoto::Srgb8(codes) => Some(codes[pixel]),
+        _ => None,
     })
 }
 

@@ -7,8 +7,9 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::lights::pack_lights;
 use super::materials::{MaterialKey, MaterialTable};
 use super::{
-    FRAME_ALPHA, FRAME_ENV_DRAWN, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES,
-    NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, Triangle, Vertex,
+    FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER, FRAME_SHUTTER_ORDERED, Frame,
+    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL,
+    PackedScene, PixelInfo, Triangle, Vertex,
 };
 use crate::accel::{AccelError, WorldBvh};
 use crate::camera::lens::frame_camera;
@@ -29,13 +30,27 @@ pub enum PackError {
     TooMany(usize, &'static str, usize),
 }
 
+/// The anchor for a camera at `position`: the one before while the camera is within its reach.
+pub fn next_anchor(before: Option<DVec3>, position: DVec3) -> DVec3 {
+    before
+        .filter(|anchor| position.distance(*anchor) <= ANCHOR_REACH_M)
+        .unwrap_or(position)
+}
+
 impl PackedScene {
     /// Packs the whole scene, anchored at its camera.
     ///
     /// # Errors
     /// More triangles or texels than 32-bit indices address, or an acceleration structure cannot be built.
     pub fn build(scene: &Scene) -> Result<Self, PackError> {
-        let anchor = scene.camera.world_from_camera.w_axis.truncate();
+        Self::build_at(scene, scene.camera.world_from_camera.w_axis.truncate())
+    }
+
+    /// [`PackedScene::build`] anchored at a point of the world, which should be near the camera.
+    ///
+    /// # Errors
+    /// As [`PackedScene::build`].
+    pub fn build_at(scene: &Scene, anchor: DVec3) -> Result<Self, PackError> {
         let mut packed = Self {
             frame: bytemuck::Zeroable::zeroed(),
             anchor_m: anchor.to_array(),
@@ -51,6 +66,7 @@ impl PackedScene {
             env_cdf: Vec::new(),
             photo_albedo: Vec::new(),
             pixels: Vec::new(),
+            swept_spheres: Vec::new(),
             material_table: MaterialTable::default(),
             real_vertex_count: 0,
             env_mean_luminance: 0.0,
@@ -94,7 +110,8 @@ impl PackedScene {
     /// Whether the camera is still near enough to the anchor to keep what is packed.
     pub fn anchor_serves(&self, scene: &Scene) -> bool {
         let camera = scene.camera.world_from_camera.w_axis.truncate();
-        camera.distance(DVec3::from(self.anchor_m)) <= ANCHOR_REACH_M
+        let anchor = DVec3::from(self.anchor_m);
+        next_anchor(Some(anchor), camera) == anchor
     }
 
     /// Camera and lens; nothing else depends on them but the pilot.
@@ -105,6 +122,7 @@ impl PackedScene {
             DVec3::from(self.anchor_m),
             &mut self.frame,
         );
+        self.frame.flags &= !(FRAME_SHUTTER | FRAME_SHUTTER_ORDERED);
         let count = scene.camera.width as usize * scene.camera.height as usize;
         self.pixels = vec![PixelInfo::uniform(PIXEL_BEAM_MAY_MEET_VIRTUAL); count];
         debug_assert!(matches!(
@@ -196,8 +214,13 @@ impl PackedScene {
                 radiance,
             } = light.kind
             {
-                let material = self.materials.len() as u32;
-                self.materials.push(MaterialTable::quad_light(radiance));
+                let record = MaterialTable::quad_light(radiance);
+                // The virtual world is packed again whenever it moves: its lamps must not pile up.
+                let known = self.materials.iter().position(|m| *m == record);
+                let material = known.unwrap_or(self.materials.len()) as u32;
+                if known.is_none() {
+                    self.materials.push(record);
+                }
                 self.add_quad(
                     DVec3::from(corner),
                     DVec3::from(edge_u),

@@ -7,13 +7,15 @@ mod build;
 mod lights;
 mod materials;
 mod records;
+mod shutter;
 #[cfg(test)]
 mod test_support;
 #[cfg(test)]
 mod tests;
 
-pub use build::PackError;
+pub use build::{PackError, next_anchor};
 pub use records::*;
+pub use shutter::{Instant, instants, row_ends, traced_shutter};
 #[cfg(test)]
 pub use test_support::{test_mesh, test_scene};
 
@@ -24,6 +26,9 @@ pub const NONE: u32 = u32::MAX;
 
 /// Bounding spheres of the virtual geometry, at most this many.
 pub const MAX_SPHERES: usize = 16;
+
+/// Camera poses at equal steps of the time for which the shutter is open, the first and the last moment included.
+pub const SHUTTER_POSES: usize = 9;
 
 /// What a backend renders.
 pub struct PackedScene {
@@ -51,6 +56,8 @@ pub struct PackedScene {
     pub photo_albedo: Vec<[f32; 4]>,
     /// One word a pixel: what the pilot found (see [`PixelInfo`]).
     pub pixels: Vec<PixelInfo>,
+    /// What bounds moving objects over the whole time of the shutter; empty where nothing moves: then the frame's spheres do.
+    pub swept_spheres: Vec<[f32; 4]>,
     material_table: materials::MaterialTable,
     real_vertex_count: usize,
     env_mean_luminance: f64,
@@ -76,6 +83,7 @@ impl PackedScene {
             env_cdf: Vec::new(),
             photo_albedo: Vec::new(),
             pixels: Vec::new(),
+            swept_spheres: Vec::new(),
             material_table: materials::MaterialTable::default(),
             real_vertex_count: 0,
             env_mean_luminance: 0.0,

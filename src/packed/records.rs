@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::MAX_SPHERES;
+use super::{MAX_SPHERES, SHUTTER_POSES};
 
 /// The uniform block: camera, lens, sampling and counts.
 #[repr(C)]
@@ -60,11 +60,15 @@ pub struct Frame {
     pub virtual_leaf_base: u32,
     /// Largest radiance that an indirect contribution may have; infinity: off.
     pub clamp_indirect: f32,
-    pub pad_0: f32,
-    pub pad_1: f32,
-    pub pad_2: f32,
+    /// Between the openings of two rows: share of the time from the opening of the first row to the closing of the last.
+    pub shutter_row: f32,
+    /// Share of that time for which each row is open.
+    pub shutter_open: f32,
+    pub pad: f32,
     /// Bounding spheres of the virtual geometry: centre, radius.
     pub spheres: [[f32; 4]; MAX_SPHERES],
+    /// Anchor-relative position (w unused) and unit quaternion x, y, z, w of each pose.
+    pub shutter_poses: [[f32; 4]; 2 * SHUTTER_POSES],
 }
 
 /// The environment is visible to primary rays (a photograph is present).
@@ -75,6 +79,10 @@ pub const FRAME_AOVS: u32 = 2;
 pub const FRAME_ALPHA: u32 = 4;
 /// All light comes from a few lights that are drawn well wherever they are seen from: the last diffuse vertex need not look for it.
 pub const FRAME_LIGHTS_SUFFICE: u32 = 8;
+/// The camera moves while the shutter is open.
+pub const FRAME_SHUTTER: u32 = 16;
+/// A pixel's samples follow one another in time.
+pub const FRAME_SHUTTER_ORDERED: u32 = 32;
 
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -32,6 +32,8 @@ pub fn test_scene() -> Scene {
         environment: None,
         lights: Vec::new(),
         objects: Vec::new(),
+        shutter: None,
+        camera_path: Default::default(),
         settings: Settings {
             rays_per_pixel: 4,
             max_bounces: 2,
@@ -74,7 +76,9 @@ pub fn test_mesh(
         name: "object".into(),
         side,
         world_from_object: DMat4::IDENTITY,
+        motion: None,
         instances: vec![Instance {
+            animation: None,
             object_from_local: DMat4::IDENTITY,
             primitive: primitive.into(),
             material: material.into(),

@@ -53,11 +53,26 @@ impl std::ops::AddAssign for RayTotals {
 
 /// One sweep over the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pass {
+pub enum Pass<'a> {
     /// Brings every pixel up to this many samples (an absolute sample index, exclusive).
     Main { end: u32 },
+    /// The same, a number for each row: what is exposed before an instant.
+    MainRows { ends: &'a [u32] },
     /// Replays the real rays that edge pixels need; `everywhere`: of all pixels that are not wholly virtual.
     Real { everywhere: bool },
+    /// The same, of the samples before each row's end.
+    RealRows { everywhere: bool, ends: &'a [u32] },
+}
+
+impl Pass<'_> {
+    /// The index, in rays per pixel, before which the samples of a row are taken.
+    pub fn end_of_row(&self, row: usize) -> u32 {
+        match self {
+            Self::Main { end } => *end,
+            Self::MainRows { ends } | Self::RealRows { ends, .. } => ends[row],
+            Self::Real { .. } => u32::MAX,
+        }
+    }
 }
 
 /// Asked by backends between tiles or batches.

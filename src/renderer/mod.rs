@@ -18,23 +18,26 @@
 //! ```
 
 mod control;
+mod motion;
 mod photo_albedo;
+mod picture_motion;
 mod skips;
 mod stats;
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::DMat4;
 
 pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
+pub use motion::FrameEdit;
+pub use picture_motion::PreviousView;
 pub use skips::{Skip, Without};
 pub use stats::{Stats, StatsRays};
 
 use crate::cpu;
 use crate::film::{Film, MergeError, Picture, Planes, composite, planes};
-use crate::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError, KernelSeconds};
-use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
+use crate::gpu::{AdapterChoice, Changed, GpuBackend, GpuDevice, GpuError, KernelSeconds};
+use crate::packed::{FRAME_AOVS, Instant, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Side};
 
 /// The longest a pass runs before the film is shown, in rays per pixel.
@@ -88,6 +91,12 @@ pub struct Renderer {
     rays: RayTotals,
     seconds: Seconds,
     notes: Vec<String>,
+    /// Where moving objects stand while the shutter is open; empty: nothing moves.
+    instants: Vec<Instant>,
+    /// The first instant that may have samples left to take.
+    next_instant: usize,
+    /// The picture's time.
+    time_secs: f64,
 }
 
 enum Backend {
@@ -103,13 +112,14 @@ impl Renderer {
     /// # Errors
     /// The scene does not fit the packed form or the adapter, or `gpu` was asked for where there is none.
     pub fn new(scene: Scene, options: RendererOptions) -> Result<Self, RenderError> {
-        let start = Instant::now();
+        let start = std::time::Instant::now();
         let total = scene.settings.rays_per_pixel;
         let (first_sample, end_sample) = options.sample_range.unwrap_or((0, total));
         if first_sample >= end_sample || end_sample > total {
             return Err(RenderError::SampleRange(first_sample, end_sample, total));
         }
         let packed = PackedScene::build(&scene)?;
+        let time_secs = scene.shutter.map_or(0.0, |shutter| shutter.time_secs);
         let film = Film::new(
             packed.frame.width,
             packed.frame.height,
@@ -126,11 +136,15 @@ impl Renderer {
             rays: RayTotals::default(),
             seconds: Seconds::default(),
             notes: Vec::new(),
+            instants: Vec::new(),
+            next_instant: 0,
+            time_secs,
         };
         renderer.prepare_photo();
+        renderer.prepare_shutter()?;
         renderer.look_ahead();
         renderer.seconds.build = start.elapsed().as_secs_f64();
-        let start = Instant::now();
+        let start = std::time::Instant::now();
         renderer.backend = renderer.open_backend()?;
         renderer.seconds.compile = start.elapsed().as_secs_f64();
         Ok(renderer)
@@ -223,7 +237,7 @@ impl Renderer {
         cancelled: &(dyn Fn() -> bool + Sync),
         progress: &mut dyn FnMut(Progress),
     ) -> Result<(), RenderError> {
-        let start = Instant::now();
+        let start = std::time::Instant::now();
         let deadline = match budget {
             Budget::Time(time) => Some(start + time),
             Budget::Complete | Budget::Rays(_) => None,
@@ -238,6 +252,11 @@ impl Renderer {
             ),
             Budget::Complete | Budget::Time(_) => total,
         };
+        if !self.instants.is_empty() && !self.nothing_to_trace() {
+            self.advance_in_time(first + end, cancelled, deadline, progress)?;
+            self.seconds.render += start.elapsed().as_secs_f64();
+            return Ok(());
+        }
         let mut done = before;
         while done < end && !self.nothing_to_trace() {
             let step = done.clamp(1, MAX_PASS_SAMPLES).min(end - done);
@@ -269,7 +288,10 @@ impl Renderer {
         let everywhere = self.options.all_planes
             || self.scene.settings.composite == Composite::Quotient
             || self.options.without.contains(Skip::EdgeReal);
-        self.run_pass(Pass::Real { everywhere }, &Cancel::new(&|| false, None))
+        if self.instants.is_empty() {
+            return self.run_pass(Pass::Real { everywhere }, &Cancel::new(&|| false, None));
+        }
+        self.replay_real_in_time(everywhere)
     }
 
     /// A renderer that goes on from the film of an earlier one of the same scene and settings: it stands at the film's last sample, and traces
@@ -317,7 +339,7 @@ impl Renderer {
         self.packed.frame.seed = seed;
         self.film.first_sample = 0;
         self.end_sample = rays_per_pixel;
-        self.restart(false)
+        self.restart(false, Changed::View)
     }
 
     /// Another lens. Nothing is rebuilt but the pilot; the film starts anew.
@@ -327,7 +349,7 @@ impl Renderer {
     pub fn set_lens(&mut self, lens: Lens) -> Result<(), RenderError> {
         self.scene.lens = lens;
         self.packed.set_camera(&self.scene);
-        self.restart(false)
+        self.restart(false, Changed::View)
     }
 
     /// Another camera pose. While it stays near the anchor nothing is rebuilt but the pilot.
@@ -338,13 +360,13 @@ impl Renderer {
         self.scene.camera.world_from_camera = world_from_camera;
         if self.packed.anchor_serves(&self.scene) {
             self.packed.set_camera(&self.scene);
-        } else {
-            self.packed = PackedScene::build(&self.scene)?;
+            return self.restart(true, Changed::View);
         }
-        self.restart(true)
+        self.packed = PackedScene::build(&self.scene)?;
+        self.restart(true, Changed::All)
     }
 
-    /// Moves an object of the scene. A virtual one costs the virtual BVH, a real one everything.
+    /// Moves an object of the scene, which then rests there. A virtual one costs the virtual BVH, a real one everything.
     ///
     /// # Errors
     /// There is no such object, or as [`Renderer::new`].
@@ -359,12 +381,20 @@ impl Renderer {
             .get_mut(object)
             .ok_or(RenderError::NoSuchObject(object))?;
         entry.world_from_object = world_from_object;
-        let real = entry.side == Side::Real;
-        match entry.side {
-            Side::Virtual => self.packed.rebuild_virtual(&self.scene)?,
-            Side::Real => self.packed = PackedScene::build(&self.scene)?,
+        entry.motion = None;
+        for instance in &mut entry.instances {
+            instance.animation = None;
         }
-        self.restart(real)
+        match entry.side {
+            Side::Virtual => {
+                self.packed.rebuild_virtual(&self.scene)?;
+                self.restart(false, Changed::Virtual)
+            }
+            Side::Real => {
+                self.packed = PackedScene::build(&self.scene)?;
+                self.restart(true, Changed::All)
+            }
+        }
     }
 
     /// Other lights. Real quads are part of the real world, so where they change it is built anew.
@@ -386,22 +416,27 @@ impl Renderer {
         } else {
             self.packed.rebuild_virtual(&self.scene)?;
         }
-        self.restart(true)
+        self.restart(true, Changed::All)
     }
 
     /// Takes up the packed scene after an edit.
-    fn restart(&mut self, real_light_changed: bool) -> Result<(), RenderError> {
-        let start = Instant::now();
+    fn restart(&mut self, real_light_changed: bool, changed: Changed) -> Result<(), RenderError> {
+        let start = std::time::Instant::now();
         if real_light_changed {
             self.prepare_photo();
         }
+        let swept = self.prepare_shutter()?;
         self.look_ahead();
         if let Backend::Gpu(gpu) = &mut self.backend {
-            gpu.set_scene(&self.packed)?;
+            let changed = match changed {
+                Changed::View if swept => Changed::Virtual,
+                changed => changed,
+            };
+            gpu.update_scene(&self.packed, changed)?;
         }
         self.seconds.build += start.elapsed().as_secs_f64();
         if matches!(self.backend, Backend::Undecided) {
-            let start = Instant::now();
+            let start = std::time::Instant::now();
             self.backend = self.open_backend()?;
             self.seconds.compile += start.elapsed().as_secs_f64();
         }
@@ -416,7 +451,7 @@ impl Renderer {
         }
     }
 
-    fn run_pass(&mut self, pass: Pass, cancel: &Cancel) -> Result<(), RenderError> {
+    fn run_pass(&mut self, pass: Pass<'_>, cancel: &Cancel) -> Result<(), RenderError> {
         if let Backend::Gpu(gpu) = &mut self.backend {
             match gpu.render_pass(&self.packed, &mut self.film, pass, cancel, &mut self.rays) {
                 Err(error @ GpuError::Lost(_)) => {

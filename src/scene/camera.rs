@@ -6,6 +6,7 @@ use super::error::Result;
 use super::image_file::{MAX_PIXELS, MAX_SIDE_PX};
 use super::pose::read_camera_pose;
 use super::reader::{Node, Table};
+use super::trajectory::Intrinsics;
 use super::{Aperture, Camera, Lens, Photo};
 
 const CAMERA_KEYS: &[&str] = &[
@@ -21,6 +22,7 @@ const CAMERA_KEYS: &[&str] = &[
     "position",
     "look_at",
     "up",
+    "motion",
 ];
 
 const LENS_KEYS: &[&str] = &[
@@ -32,8 +34,30 @@ const LENS_KEYS: &[&str] = &[
     "blade_rotation_deg",
 ];
 
-pub(super) fn read_camera(root: &Table, photo: Option<&Photo>) -> Result<Camera> {
-    let Some(table) = root.table("camera", "[camera]", CAMERA_KEYS)? else {
+/// `[camera]`, its intrinsics those `given` by the caller, if it brings any; then the table may be absent.
+pub(super) fn read_camera(
+    root: &Table,
+    photo: Option<&Photo>,
+    given: Option<&Intrinsics>,
+) -> Result<Camera> {
+    let table = root.table("camera", "[camera]", CAMERA_KEYS)?;
+    if let Some(given) = given {
+        let size = photo
+            .map(|photo| (photo.width, photo.height))
+            .or(given.size);
+        let pose = table.as_ref().map(read_camera_pose).transpose()?;
+        return size
+            .ok_or_else(|| "the intrinsics tell no size".to_owned())
+            .and_then(|size| given.camera(size, pose.unwrap_or_default()))
+            .map_err(|problem| {
+                root.error(
+                    problem,
+                    "intrinsics of the frames' size",
+                    "calibrate at that size, or scale the frames",
+                )
+            });
+    }
+    let Some(table) = table else {
         return Err(root.error(
             "the scene has no [camera]",
             "a table [camera] with `fx` and `fy` or `vertical_fov_deg`",
@@ -119,12 +143,7 @@ fn read_focal_lengths(table: &Table, height: f64) -> Result<(f64, f64)> {
 }
 
 pub(super) fn read_lens(root: &Table) -> Result<Lens> {
-    let pinhole = Lens {
-        aperture_radius_m: 0.0,
-        focus_distance_m: f64::INFINITY,
-        aperture: Aperture::Disc,
-        blade_rotation_deg: 0.0,
-    };
+    let pinhole = Lens::PINHOLE;
     let Some(table) = root.table("lens", "[lens]", LENS_KEYS)? else {
         return Ok(pinhole);
     };

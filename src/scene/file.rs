@@ -4,7 +4,6 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-use super::Scene;
 use super::camera::{read_camera, read_lens};
 use super::environment::read_environment;
 use super::error::{Result, SceneError, Source};
@@ -13,7 +12,10 @@ use super::object::ObjectReader;
 use super::photo::read_photo;
 use super::reader::Table;
 use super::settings::read_settings;
+use super::shutter::{read_camera_motion, read_shutter};
 use super::stages::read_stages;
+use super::trajectory::Intrinsics;
+use super::{Photo, Scene};
 
 const TABLES: &[&str] = &[
     "photo",
@@ -31,8 +33,14 @@ const TABLES: &[&str] = &[
     "cartoon",
 ];
 
-/// Known to the format; rendering without them would silently give another picture than the one asked for.
-const NOT_APPLIED: &[&str] = &["shutter", "motion_blur"];
+/// What a caller brings in place of the scene file's own.
+#[derive(Clone, Debug, Default)]
+pub struct Given {
+    /// Replaces `[photo] image`.
+    pub photo: Option<Photo>,
+    /// Replaces the intrinsics in `[camera]`, which may then be absent.
+    pub intrinsics: Option<Intrinsics>,
+}
 
 /// Reads a scene file (TOML) and everything it names.
 ///
@@ -43,14 +51,22 @@ const NOT_APPLIED: &[&str] = &["shutter", "motion_blur"];
 /// [`SceneError`] names the file, line and column of the first thing that cannot be used, what was expected and how to mend it: bad
 /// TOML, unknown keys, wrong types, impossible values, missing or broken files.
 pub fn load(path: &Path) -> std::result::Result<Scene, SceneError> {
+    load_with(path, Given::default())
+}
+
+/// [`load`] with what the caller brings.
+///
+/// # Errors
+/// As [`load`]; or the intrinsics do not fit the photograph.
+pub fn load_with(path: &Path, given: Given) -> std::result::Result<Scene, SceneError> {
     let bytes = std::fs::read(path).map_err(|error| SceneError::Unreadable {
         path: path.to_path_buf(),
         reason: error.to_string(),
     })?;
-    read_scene(&Source::new(path, bytes)?)
+    read_scene(&Source::new(path, bytes)?, given)
 }
 
-pub(super) fn read_scene(source: &Source) -> Result<Scene> {
+pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
     let document = DeTable::parse(&source.text).map_err(|error| {
         let offset = error.span().map_or(0, |span| span.start);
         let message = match error.message().split_once(", expected ") {
@@ -61,19 +77,13 @@ pub(super) fn read_scene(source: &Source) -> Result<Scene> {
     })?;
     let root = Table::root(source, document.get_ref());
     root.refuse_unknown(TABLES)?;
-    for table in NOT_APPLIED {
-        let message = format!(
-            "[{table}] is not applied by this version; expected a scene without it; remove the table"
-        );
-        if let Some(error) = root.key_error(table, &message) {
-            return Err(error);
-        }
-    }
     let mut warnings = Vec::new();
-    let (photo, exposure) = read_photo(&root, &mut warnings)?;
+    let (photo, exposure) = read_photo(&root, given.photo, &mut warnings)?;
     let settings = read_settings(&root, exposure)?;
     let stages = read_stages(&root)?;
-    let camera = read_camera(&root, photo.as_ref())?;
+    let camera = read_camera(&root, photo.as_ref(), given.intrinsics.as_ref())?;
+    let camera_path = read_camera_motion(&root)?;
+    let shutter = read_shutter(&root)?;
     let lens = read_lens(&root)?;
     let environment = read_environment(&root, &mut warnings)?;
     let mut lights = read_lights(&root)?;
@@ -91,11 +101,14 @@ pub(super) fn read_scene(source: &Source) -> Result<Scene> {
         environment,
         lights,
         objects,
+        shutter,
+        camera_path,
         settings,
         inputs,
         stages,
         warnings,
-    })
+    }
+    .at_its_time())
 }
 
 /// The name of the folder that holds the file, or else of the file.

@@ -32,13 +32,15 @@ impl Scene {
             environment,
             lights,
             objects,
+            shutter,
+            camera_path,
             settings: _,
             warnings: _,
         } = self;
         // `Debug` writes every field, and numbers so that they read back exactly; the hash never fails.
         let _ = write!(
             hash,
-            "{max_bounces} {clamp_indirect:?} {exposure:?} {camera:?} {lens:?} {environment:?} {lights:?} {objects:?}"
+            "{max_bounces} {clamp_indirect:?} {exposure:?} {camera:?} {lens:?} {environment:?} {lights:?} {objects:?} {shutter:?} {camera_path:?}"
         );
         if let Some(photo) = photo {
             let _ = write!(hash, "{} {}", photo.width, photo.height);
@@ -46,6 +48,16 @@ impl Scene {
         }
         format!("{:016x}", hash.0)
     }
+}
+
+/// 16 hexadecimal digits of these texts.
+pub fn fingerprint_of<'a>(texts: impl IntoIterator<Item = &'a str>) -> String {
+    let mut hash = Fnv1a(0xcbf2_9ce4_8422_2325);
+    for text in texts {
+        hash.bytes(text.as_bytes());
+        hash.bytes(&[0]);
+    }
+    format!("{:016x}", hash.0)
 }
 
 /// FNV-1a, 64 bits (Fowler, Noll, Vo).

@@ -37,11 +37,16 @@ pub(super) fn read_image(path: &Path) -> Result<ImageFile, String> {
             "it cannot be read ({error}); expected an image file; correct the path or the rights"
         )
     })?;
-    let image = match bytes.as_slice() {
-        [0x89, b'P', b'N', b'G', ..] => read_codes(&bytes, ImageFormat::Png),
-        [0xff, 0xd8, ..] => read_codes(&bytes, ImageFormat::Jpeg),
-        [b'#', b'?', ..] => read_hdr(&bytes),
-        [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(&bytes),
+    decode_image(&bytes)
+}
+
+/// Decodes an image file's bytes. An error reads as one of [`read_image`].
+pub(super) fn decode_image(bytes: &[u8]) -> Result<ImageFile, String> {
+    let image = match bytes {
+        [0x89, b'P', b'N', b'G', ..] => read_codes(bytes, ImageFormat::Png),
+        [0xff, 0xd8, ..] => read_codes(bytes, ImageFormat::Jpeg),
+        [b'#', b'?', ..] => read_hdr(bytes),
+        [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(bytes),
         _ => Err("its format is not known; expected PNG, JPEG, OpenEXR or Radiance HDR; convert the image".to_owned()),
     }?;
     if let Pixels::Linear(pixels) = &image.pixels {

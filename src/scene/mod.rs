@@ -3,6 +3,7 @@
 //! [`load`] turns a scene file into a [`Scene`]; everything a file can get wrong is refused there, with file, line and column.
 //! What leaves this module is finite, in range and refers only to things that exist.
 
+pub mod animation;
 mod camera;
 mod environment;
 mod error;
@@ -20,14 +21,17 @@ mod reader;
 mod scan;
 mod settings;
 pub(crate) mod shape;
+mod shutter;
 pub mod smooth;
 pub mod srgb;
 mod stages;
 #[cfg(test)]
 mod tests;
+pub mod trajectory;
 
 pub use error::SceneError;
-pub use file::load;
+pub use file::{Given, load, load_with};
+pub use fingerprint::fingerprint_of;
 pub use noise_profile::{
     Autocorrelation, LAGS, MAX_BINS, NOISE_PROFILE_VERSION, NoiseBin, NoiseFit, NoiseProfile,
     WHITE, bin_index,
@@ -35,9 +39,10 @@ pub use noise_profile::{
 pub use photo::read_codes;
 pub use reader::Choice;
 pub use settings::Overrides;
+pub use shutter::{MotionKey, ObjectMotion, Shutter};
 pub use stages::{
-    AntialiasSettings, CartoonSettings, CartoonStyle, FlowSettings, NoiseMethod, NoiseSettings,
-    Stages,
+    AntialiasSettings, CartoonSettings, CartoonStyle, FlowSettings, MotionBlurMethod,
+    MotionBlurSettings, NoiseMethod, NoiseSettings, Stages,
 };
 
 use std::path::PathBuf;
@@ -64,6 +69,10 @@ pub struct Scene {
     pub environment: Option<Environment>,
     pub lights: Vec<Light>,
     pub objects: Vec<Object>,
+    /// `None`: nothing moves while a picture is taken.
+    pub shutter: Option<Shutter>,
+    /// The camera's way in time; empty: it stands still.
+    pub camera_path: trajectory::CameraPath,
     pub settings: Settings,
     /// The files that the scene is made of, its own included.
     pub inputs: Vec<PathBuf>,
@@ -117,6 +126,16 @@ pub struct Lens {
     pub focus_distance_m: f64,
     pub aperture: Aperture,
     pub blade_rotation_deg: f64,
+}
+
+impl Lens {
+    /// Everything is sharp.
+    pub const PINHOLE: Self = Self {
+        aperture_radius_m: 0.0,
+        focus_distance_m: f64::INFINITY,
+        aperture: Aperture::Disc,
+        blade_rotation_deg: 0.0,
+    };
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,7 +206,10 @@ pub enum LightKind {
 pub struct Object {
     pub name: String,
     pub side: Side,
+    /// At the picture's time.
     pub world_from_object: DMat4,
+    /// Virtual objects only; `None`: it rests.
+    pub motion: Option<ObjectMotion>,
     pub instances: Vec<Instance>,
     /// Real rays that leave this proxy do not meet the real world closer than this. 0: off.
     pub self_shadow_bias_m: f32,
@@ -197,7 +219,10 @@ pub struct Object {
 
 #[derive(Clone, Debug)]
 pub struct Instance {
+    /// At the picture's time.
     pub object_from_local: DMat4,
+    /// What moves it within its object, if anything does.
+    pub animation: Option<animation::InstanceAnimation>,
     pub primitive: Arc<Primitive>,
     pub material: Arc<Material>,
 }

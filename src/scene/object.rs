@@ -8,12 +8,13 @@ use std::sync::Arc;
 use glam::{DMat3, DMat4, DVec3};
 
 use super::error::{Result, SceneError};
-use super::gltf::{GltfScene, PlacedLight, Problem, PunctualLight, load_gltf};
+use super::gltf::{GltfScene, PlacedLight, Problem, PunctualLight, load_animated};
 use super::material::{lambertian, read_material};
 use super::pose::read_transform;
 use super::reader::{Choice, Node, Table};
 use super::scan::settle_scan;
 use super::shape::Shape;
+use super::shutter::read_object_motion;
 use super::{AlphaMode, Instance, Light, LightKind, Material, Object, Side};
 
 const KEYS: &[&str] = &[
@@ -25,6 +26,8 @@ const KEYS: &[&str] = &[
     "rotation",
     "scale",
     "material",
+    "motion",
+    "animation",
 ];
 
 const REAL_KEYS: &[&str] = &["albedo", "smooth_radius_m", "self_shadow_bias_m"];
@@ -42,7 +45,7 @@ pub(super) struct ObjectReader<'w> {
     /// Lights that meshes brought.
     lights: Vec<Light>,
     /// A file that several objects name is read once.
-    meshes: HashMap<PathBuf, Rc<GltfScene>>,
+    meshes: HashMap<(PathBuf, Option<String>), Rc<GltfScene>>,
 }
 
 /// What an object is made of, before materials are settled.
@@ -83,7 +86,13 @@ impl<'w> ObjectReader<'w> {
         let shape = check_keys(&table, side)?;
         let parts = match shape {
             Some(shape) => read_shape(shape, &table)?,
-            None => table.required("mesh", "mesh = \"file.glb\"", |node| self.read_mesh(node))?,
+            None => {
+                let animation =
+                    table.optional("animation", |node| Ok(node.string()?.to_owned()))?;
+                table.required("mesh", "mesh = \"file.glb\"", |node| {
+                    self.read_mesh(node, animation)
+                })?
+            }
         };
         let world_from_object = read_transform(&table)?;
         let name = table.optional("name", |node| Ok(node.string()?.to_owned()))?;
@@ -91,6 +100,7 @@ impl<'w> ObjectReader<'w> {
             name: name.unwrap_or(parts.name),
             side,
             world_from_object,
+            motion: read_object_motion(&table, world_from_object)?,
             instances: parts.instances,
             self_shadow_bias_m: 0.0,
             albedo_from_photo: false,
@@ -111,17 +121,18 @@ impl<'w> ObjectReader<'w> {
         Ok(object)
     }
 
-    fn read_mesh(&mut self, node: &Node) -> Result<Parts> {
+    fn read_mesh(&mut self, node: &Node, animation: Option<String>) -> Result<Parts> {
         let path = node.existing_file()?;
-        let mesh = match self.meshes.get(&path) {
+        let key = (path.clone(), animation);
+        let mesh = match self.meshes.get(&key) {
             Some(mesh) => Rc::clone(mesh),
             None => {
-                let mesh = load_gltf(&path)
+                let mesh = load_animated(&path, key.1.as_deref())
                     .map_err(|error| node.file_error(&path, &advise(&error.problem)))?;
                 self.warnings
                     .extend(node.file_warnings(mesh.warnings.clone()));
                 let mesh = Rc::new(mesh);
-                self.meshes.insert(path.clone(), Rc::clone(&mesh));
+                self.meshes.insert(key, Rc::clone(&mesh));
                 mesh
             }
         };
@@ -192,6 +203,65 @@ impl<'w> ObjectReader<'w> {
     }
 }
 
+impl Object {
+    /// It has a motion, or a part of it an animation.
+    pub fn is_animated(&self) -> bool {
+        self.motion.is_some() || self.instances.iter().any(|i| i.animation.is_some())
+    }
+
+    /// World-from-object at a time.
+    pub fn world_from_object_at(&self, time_secs: f64) -> DMat4 {
+        match &self.motion {
+            Some(motion) => motion.at(time_secs),
+            None => self.world_from_object,
+        }
+    }
+
+    /// The middle of the smallest box along the object's own axes around all its vertices, at a time, world space; `None` if it is empty.
+    pub fn centre_at(&self, time_secs: f64) -> Option<DVec3> {
+        let points = self.instances.iter().flat_map(|instance| {
+            let transform = instance.object_from_local_at(time_secs);
+            (instance.primitive.positions.iter())
+                .map(move |p| transform.transform_point3(DVec3::from(p.map(f64::from))))
+        });
+        let (lo, hi) = bounds(points)?;
+        let world_from_object = self.world_from_object_at(time_secs);
+        Some(world_from_object.transform_point3((lo + hi) * 0.5))
+    }
+}
+
+impl Instance {
+    pub fn object_from_local_at(&self, time_secs: f64) -> DMat4 {
+        match &self.animation {
+            Some(animation) => animation.object_from_local(time_secs),
+            None => self.object_from_local,
+        }
+    }
+
+    /// Corners of the box around the vertices, local space; none if there are no vertices.
+    pub fn corners(&self) -> Vec<DVec3> {
+        let positions = self.primitive.positions.iter();
+        let Some((lo, hi)) = bounds(positions.map(|p| DVec3::from(p.map(f64::from)))) else {
+            return Vec::new();
+        };
+        let side = |corner: u32, axis: usize| match corner >> axis & 1 {
+            0 => lo[axis],
+            _ => hi[axis],
+        };
+        (0..8)
+            .map(|corner| DVec3::new(side(corner, 0), side(corner, 1), side(corner, 2)))
+            .collect()
+    }
+}
+
+/// Least and greatest corner.
+fn bounds(points: impl Iterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
+    points.fold(None, |bounds, p| {
+        let (lo, hi) = bounds.unwrap_or((p, p));
+        Some((lo.min(p), hi.max(p)))
+    })
+}
+
 /// Refuses keys that do not go with this side and shape; returns the shape.
 fn check_keys(table: &Table, side: Side) -> Result<Option<Shape>> {
     table.refuse_both("mesh", "shape")?;
@@ -200,6 +270,16 @@ fn check_keys(table: &Table, side: Side) -> Result<Option<Shape>> {
         for key in REAL_KEYS {
             let message = format!(
                 "`{key}` in [[virtual]]; expected it in [[real]] only, where the photograph and scans are; remove it"
+            );
+            if let Some(error) = table.key_error(key, &message) {
+                return Err(error);
+            }
+        }
+    }
+    if side == Side::Real {
+        for key in ["motion", "animation"] {
+            let message = format!(
+                "`{key}` in [[real]]; expected it in [[virtual]] only: the photograph shows real things where they are; remove it"
             );
             if let Some(error) = table.key_error(key, &message) {
                 return Err(error);
@@ -219,6 +299,7 @@ fn read_shape(shape: Shape, table: &Table) -> Result<Parts> {
     Ok(Parts {
         name: shape.name().to_owned(),
         instances: vec![Instance {
+            animation: None,
             object_from_local: DMat4::IDENTITY,
             primitive: Arc::new(shape.read(table)?),
             material: Arc::new(Material::default()),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::error::Result;
-use super::image_file::{Pixels, read_image};
+use super::image_file::{ImageFile, Pixels, decode_image, read_image};
 use super::reader::{Node, Table};
 use super::srgb::{decode8, decode16};
 use super::{EncodedPhoto, Exposure, Photo};
@@ -12,12 +12,16 @@ const KEYS: &[&str] = &["image", "exposure_ev"];
 
 pub(super) fn read_photo(
     root: &Table,
+    given: Option<Photo>,
     warnings: &mut Vec<String>,
 ) -> Result<(Option<Photo>, Exposure)> {
     let Some(table) = root.table("photo", "[photo]", KEYS)? else {
-        return Ok((None, Exposure::Ev(0.0)));
+        return Ok((given, Exposure::Ev(0.0)));
     };
-    let photo = table.optional("image", |node| read_photo_image(node, warnings))?;
+    let photo = match given {
+        Some(photo) => Some(photo),
+        None => table.optional("image", |node| read_photo_image(node, warnings))?,
+    };
     let exposure = table.optional("exposure_ev", |node| read_exposure(node, photo.is_some()))?;
     Ok((photo, exposure.unwrap_or(Exposure::Ev(0.0))))
 }
@@ -67,12 +71,33 @@ impl Photo {
     /// # Errors
     /// Why the file cannot be used, in one line without its path.
     pub fn read(path: &Path) -> std::result::Result<(Self, Vec<String>), String> {
-        let image = read_image(path)?;
+        Ok(Self::of(read_image(path)?))
+    }
+
+    /// Decodes the bytes of an image file.
+    ///
+    /// # Errors
+    /// Why they cannot be used, in one line.
+    pub fn decode(bytes: &[u8]) -> std::result::Result<(Self, Vec<String>), String> {
+        Ok(Self::of(decode_image(bytes)?))
+    }
+
+    /// sRGB codes, row-major from the top left.
+    pub fn from_srgb8(width: u32, height: u32, codes: Vec<[u8; 3]>) -> Self {
+        Self {
+            width,
+            height,
+            linear: codes.iter().map(|code| code.map(decode8)).collect(),
+            encoded: EncodedPhoto::Srgb8(codes),
+        }
+    }
+
+    fn of(image: ImageFile) -> (Self, Vec<String>) {
         let (linear, encoded) = match image.pixels {
-            Pixels::Srgb8(codes) => (
-                codes.iter().map(|code| code.map(decode8)).collect(),
-                EncodedPhoto::Srgb8(codes),
-            ),
+            Pixels::Srgb8(codes) => {
+                let photo = Self::from_srgb8(image.width, image.height, codes);
+                return (photo, image.warnings);
+            }
             Pixels::Srgb16(codes) => (
                 codes.iter().map(|code| code.map(decode16)).collect(),
                 EncodedPhoto::Srgb16(codes),
@@ -85,6 +110,6 @@ impl Photo {
             linear,
             encoded,
         };
-        Ok((photo, image.warnings))
+        (photo, image.warnings)
     }
 }

@@ -64,7 +64,18 @@ fn read_rigid(node: &Node) -> Result<DMat4> {
     for (numbers, row) in matrix.iter_mut().zip(&rows) {
         *numbers = row.vector::<4>()?;
     }
-    let pose = DMat4::from_cols_array_2d(&matrix).transpose();
+    rigid(&matrix).map_err(|problem| {
+        node.error(
+            format!("`{}` is not rigid: {problem}", node.label()),
+            "a rotation and a translation, as 4 rows, the camera looking along its -Z",
+            "correct the matrix (OpenCV poses need their y and z axes negated)",
+        )
+    })
+}
+
+/// The nearest rigid transform of a matrix of rows that is one within [`RIGID_TOLERANCE`], or why it is none. NaN is none.
+pub(super) fn rigid(rows: &[[f64; 4]; 4]) -> std::result::Result<DMat4, String> {
+    let pose = DMat4::from_cols_array_2d(rows).transpose();
     let rotation = DMat3::from_mat4(pose);
     let gram = rotation.transpose() * rotation - DMat3::IDENTITY;
     let off = gram
@@ -72,24 +83,21 @@ fn read_rigid(node: &Node) -> Result<DMat4> {
         .into_iter()
         .map(f64::abs)
         .fold(0.0, f64::max);
-    let last_row = DVec4::from(matrix[3]) - DVec4::W;
-    let problem = if last_row.abs().max_element() > 1e-9 {
-        "its last row is not 0 0 0 1".to_owned()
+    let last_row = DVec4::from(rows[3]) - DVec4::W;
+    if last_row.abs().max_element() > 1e-9 {
+        Err("its last row is not 0 0 0 1".to_owned())
     } else if off > RIGID_TOLERANCE {
-        format!("its columns are off unit length or right angles by {off:.2e}")
+        Err(format!(
+            "its columns are off unit length or right angles by {off:.2e}"
+        ))
     } else if rotation.determinant() < 0.0 {
-        "it mirrors".to_owned()
+        Err("it mirrors".to_owned())
     } else {
-        return Ok(DMat4::from_mat3_translation(
+        Ok(DMat4::from_mat3_translation(
             nearest_rotation(rotation),
             pose.w_axis.truncate(),
-        ));
-    };
-    Err(node.error(
-        format!("`{}` is not rigid: {problem}", node.label()),
-        "a rotation and a translation, as 4 rows, the camera looking along its -Z",
-        "correct the matrix (OpenCV poses need their y and z axes negated)",
-    ))
+        ))
+    }
 }
 
 /// Newton's iteration for the polar decomposition (Higham 1986); it converges quadratically from so near.
@@ -102,6 +110,16 @@ fn nearest_rotation(mut rotation: DMat3) -> DMat3 {
 
 /// `translation`, `rotation_deg` or `rotation`, and `scale` as T * R * S.
 pub(super) fn read_transform(table: &Table) -> Result<DMat4> {
+    let (scale, rotation, translation) = read_placement(table)?;
+    Ok(DMat4::from_scale_rotation_translation(
+        scale,
+        rotation,
+        translation,
+    ))
+}
+
+/// Scale, rotation and translation.
+pub(super) fn read_placement(table: &Table) -> Result<(DVec3, DQuat, DVec3)> {
     table.refuse_both("rotation_deg", "rotation")?;
     let translation = table.optional("translation", |node| node.vector::<3>())?;
     let euler = table.optional("rotation_deg", |node| node.vector::<3>())?;
@@ -112,7 +130,7 @@ pub(super) fn read_transform(table: &Table) -> Result<DMat4> {
         let [x, y, z] = deg.map(f64::to_radians);
         DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x)
     });
-    Ok(DMat4::from_scale_rotation_translation(
+    Ok((
         scale.unwrap_or(DVec3::ONE),
         quaternion.or(euler).unwrap_or(DQuat::IDENTITY),
         translation.map_or(DVec3::ZERO, DVec3::from),

@@ -8,6 +8,7 @@ use super::reader::{Choice, Node, Table};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stages {
     pub antialias: Option<AntialiasSettings>,
+    pub motion_blur: Option<MotionBlurSettings>,
     pub noise: Option<NoiseSettings>,
     /// Never beside the others: it replaces what makes a picture look photographed.
     pub cartoon: Option<CartoonSettings>,
@@ -23,6 +24,45 @@ pub struct AntialiasSettings {
 impl Default for AntialiasSettings {
     fn default() -> Self {
         Self { beta: 0.8 }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotionBlurMethod {
+    /// Shutter time as one more dimension of the rays.
+    Shutter,
+    /// The paper's: copies of each object along its motion in the picture.
+    Copies,
+}
+
+impl Choice for MotionBlurMethod {
+    const CHOICES: &'static [(&'static str, Self)] =
+        &[("shutter", Self::Shutter), ("copies", Self::Copies)];
+}
+
+/// How motion is shown. All but the method concerns the copies (Fischer and Bartz 2006, section 5).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionBlurSettings {
+    pub method: MotionBlurMethod,
+    /// Objects whose centre moves by less from the frame before stay sharp, pixels; so do those that move by more than the maximum, which
+    /// errors of the tracking do.
+    pub min_length_px: f32,
+    pub max_length_px: f32,
+    /// Distance between two copies, pixels; smaller is smoother and slower.
+    pub step_px: f32,
+    /// Of the copy that is drawn last, at the object's own place, 0 to 1: it keeps the photograph from shining through.
+    pub centre_opacity: f32,
+}
+
+impl Default for MotionBlurSettings {
+    fn default() -> Self {
+        Self {
+            method: MotionBlurMethod::Shutter,
+            min_length_px: 5.0,
+            max_length_px: 150.0,
+            step_px: 1.0,
+            centre_opacity: 0.8,
+        }
     }
 }
 
@@ -187,6 +227,14 @@ const NOISE_KEYS: &[&str] = &[
     "eight_bit",
 ];
 
+const MOTION_BLUR_KEYS: &[&str] = &[
+    "method",
+    "min_length_px",
+    "max_length_px",
+    "step_px",
+    "centre_opacity",
+];
+
 const CARTOON_KEYS: &[&str] = &[
     "style",
     "shrunk_width",
@@ -217,13 +265,17 @@ impl CartoonSettings {
 }
 
 pub(super) fn read_stages(root: &Table) -> Result<Stages> {
-    for stage in ["noise", "antialias"] {
+    for stage in ["noise", "antialias", "motion_blur"] {
         root.refuse_both("cartoon", stage)?;
     }
     Ok(Stages {
         antialias: root
             .table("antialias", "[antialias]", &["beta"])?
             .map(|table| read_antialias(&table))
+            .transpose()?,
+        motion_blur: root
+            .table("motion_blur", "[motion_blur]", MOTION_BLUR_KEYS)?
+            .map(|table| read_motion_blur(&table))
             .transpose()?,
         noise: root
             .table("noise", "[noise]", NOISE_KEYS)?
@@ -239,6 +291,28 @@ pub(super) fn read_stages(root: &Table) -> Result<Stages> {
 fn read_antialias(table: &Table) -> Result<AntialiasSettings> {
     let mut settings = AntialiasSettings::default();
     read(table, "beta", &mut settings.beta, |node| node.unit())?;
+    Ok(settings)
+}
+
+fn read_motion_blur(table: &Table) -> Result<MotionBlurSettings> {
+    let mut settings = MotionBlurSettings::default();
+    read(table, "method", &mut settings.method, |node| node.choice())?;
+    let length = |node: &Node| {
+        let expected = "pixels from 0 to 4096";
+        Ok(node.number(expected, |x| (0.0..=4096.0).contains(&x))? as f32)
+    };
+    read(table, "min_length_px", &mut settings.min_length_px, length)?;
+    read(table, "max_length_px", &mut settings.max_length_px, length)?;
+    read(table, "step_px", &mut settings.step_px, |node| {
+        let expected = "pixels from 0.1 to 1000";
+        Ok(node.number(expected, |x| (0.1..=1e3).contains(&x))? as f32)
+    })?;
+    read(
+        table,
+        "centre_opacity",
+        &mut settings.centre_opacity,
+        |node| node.unit(),
+    )?;
     Ok(settings)
 }
 

@@ -1,38 +1,58 @@
 //! The stages that a scene asks for, in their order, on a film's composite.
 
+use std::time::Instant;
+
 use super::EncodedImage;
 use super::antialias::antialias;
 use super::cartoon::cartoon;
+use super::film_copies::{PictureMotion, blur_film};
 use super::noise::{NoiseInput, NoiseStage};
 use super::own_variance::own_variance;
 use crate::film::{Film, Picture, QUOTIENT_EPSILON};
 use crate::gpu::{GpuError, GpuStages};
-use crate::scene::{Composite, NoiseMethod, NoiseSettings, Scene};
+use crate::scene::{
+    Composite, MotionBlurMethod, MotionBlurSettings, NoiseMethod, NoiseSettings, Scene,
+};
 
 /// A finished picture and what the user should hear about it.
 #[derive(Clone, Debug)]
 pub struct Finished {
     pub picture: Picture,
     pub notes: Vec<String>,
+    pub seconds: StageSeconds,
+}
+
+/// What each stage took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageSeconds {
+    pub antialias: f64,
+    pub motion_blur: f64,
+    pub noise: f64,
+    pub cartoon: f64,
 }
 
 /// Applies the scene's stages to the composite `picture` of `film`, as frame number `frame` of a video. Without a stage the picture
-/// comes back as it is, and nothing is computed. They run on `gpu` if there is one and it can; else on the CPU.
+/// comes back as it is, and nothing is computed. `motion` is what the copies of motion blur go along; without it they do nothing. They run on `gpu` if there is one and it can; else on the CPU.
 pub fn finish(
     mut picture: Picture,
     film: &Film,
     scene: &Scene,
     frame: u32,
+    motion: Option<&PictureMotion>,
     gpu: Option<&GpuStages>,
 ) -> Finished {
     let stages = &scene.stages;
     let mut notes = Vec::new();
+    let mut seconds = StageSeconds::default();
+    let begin = Instant::now();
     if let Some(settings) = &stages.cartoon {
         let image = EncodedImage::from_picture(&picture);
         let done = on_gpu(gpu, &mut notes, |gpu| gpu.cartoon(&image, settings, false));
         let result = done.unwrap_or_else(|| cartoon(&image, settings, false));
         picture = result.image.to_picture();
+        seconds.cartoon = begin.elapsed().as_secs_f64();
     }
+    let begin = Instant::now();
     if let Some(settings) = &stages.antialias {
         let mask = mask(film);
         let done = on_gpu(gpu, &mut notes, |gpu| {
@@ -41,10 +61,26 @@ pub fn finish(
         if !done.unwrap_or_else(|| antialias(&mut picture, &mask, settings)) {
             notes.push("[antialias] is off: the film's borders are smooth already".to_owned());
         }
+        seconds.antialias = begin.elapsed().as_secs_f64();
     }
+    let begin = Instant::now();
+    let mut blurred_mask = None;
+    let copies = |settings: &&MotionBlurSettings| settings.method == MotionBlurMethod::Copies;
+    if let (Some(settings), Some(motion)) = (stages.motion_blur.as_ref().filter(copies), motion) {
+        let mut blur = |gpu: Option<&GpuStages>| {
+            let composite = scene.settings.composite;
+            let photo = scene.photo.as_ref();
+            blur_film(&mut picture, film, photo, composite, motion, settings, gpu)
+        };
+        let done = on_gpu(gpu, &mut notes, |gpu| blur(Some(gpu)));
+        blurred_mask = done.unwrap_or_else(|| blur(None).unwrap_or_default());
+        seconds.motion_blur = begin.elapsed().as_secs_f64();
+    }
+    let begin = Instant::now();
     if let Some(settings) = &stages.noise {
         let stage = NoiseStage::new(settings, scene.settings.seed);
-        let mask = mask(film);
+        let is_blurred = blurred_mask.is_some();
+        let mask = blurred_mask.unwrap_or_else(|| mask(film));
         let mut input = NoiseInput {
             photo: scene.photo.as_ref().map(|photo| photo.linear.as_slice()),
             mask: Some(&mask),
@@ -57,6 +93,8 @@ pub fn finish(
         let ratio = ratio(film, scene.settings.composite);
         input.ratio = ratio.as_deref();
         let variance = match settings.method {
+            // Copies average the estimate's own noise away.
+            NoiseMethod::Missing if is_blurred => None,
             NoiseMethod::Missing => Some(own_variance(
                 film,
                 &picture,
@@ -73,8 +111,13 @@ pub fn finish(
         if done.is_none() {
             stage.apply(&mut picture, &input, frame);
         }
+        seconds.noise = begin.elapsed().as_secs_f64();
     }
-    Finished { picture, notes }
+    Finished {
+        picture,
+        notes,
+        seconds,
+    }
 }
 
 /// What `run` gives on the GPU; None without one, or where it cannot, which is noted.

@@ -29,6 +29,8 @@ pub(super) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -
         },
         environment: None,
         lights: Vec::new(),
+        shutter: None,
+        camera_path: Default::default(),
         objects,
         settings: Settings {
             rays_per_pixel,
@@ -83,8 +85,10 @@ pub(super) fn object(
     Object {
         name: name.to_owned(),
         side,
+        motion: None,
         world_from_object,
         instances: vec![Instance {
+            animation: None,
             object_from_local: DMat4::IDENTITY,
             primitive: Arc::new(primitive),
             material: Arc::new(material),

@@ -6,9 +6,8 @@ mod device;
 mod scenes;
 
 use mixray::gpu::{Features, harness::test_device};
-use mixray::packed::PackedScene;
 
-use agreement::{assert_agreement, assert_scene_agrees, load};
+use agreement::{assert_agreement, assert_scene_agrees, load, renderer};
 use assets::shared_data;
 use scenes::{CASES, Case, case};
 
@@ -37,6 +36,7 @@ each_case! {
     mirrors_and_gloss,
     paper_plain,
     paper_with_everything,
+    camera_in_motion,
     direct_with_everything,
 }
 
@@ -47,9 +47,7 @@ fn the_table_is_complete() {
     assert_eq!(names, TESTED);
     let features: Vec<Features> = CASES
         .iter()
-        .map(|case: &Case| {
-            Features::for_scene(&PackedScene::build(&load(&case.text())).expect("packs"))
-        })
+        .map(|case: &Case| Features::for_scene(renderer(load(&case.text()), false).packed()))
         .collect();
     for (at, (flag, _)) in Features::default().flags().into_iter().enumerate() {
         for wanted in [true, false] {

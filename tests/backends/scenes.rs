@@ -93,6 +93,27 @@ aperture = 5
 blade_rotation_deg = 11
 ";
 
+/// Steps, turns, and reads its rows one after the other.
+const MOVING_CAMERA: &str = "
+[camera]
+width = 48
+height = 36
+fx = 46.0
+distortion = [-0.12, 0.03, 0.002, -0.003, 0.01]
+[[camera.motion]]
+time_secs = -0.1
+position = [-0.1, 0.5, 2.2]
+look_at = [0, 0.2, 0]
+[[camera.motion]]
+time_secs = 0.1
+position = [0.1, 0.55, 2.1]
+look_at = [0.1, 0.3, 0]
+up = [0.1, 1, 0]
+[shutter]
+exposure_secs = 0.1
+readout_secs = 0.05
+";
+
 const MATT_FLOOR: &str = "
 [[real]]
 shape = \"quad\"
@@ -429,6 +450,19 @@ pub const CASES: &[Case] = &[
         ],
         settings: "max_bounces = 3\nestimator = \"paper\"",
         all_planes: true,
+    },
+    Case {
+        name: "camera_in_motion",
+        parts: &[
+            MOVING_CAMERA,
+            BLADED_LENS,
+            FLAT_SKY,
+            MATT_FLOOR,
+            OCCLUDER,
+            MATT_BALL,
+        ],
+        settings: "max_bounces = 1\nsampler = \"cmj\"",
+        all_planes: false,
     },
     Case {
         name: "direct_with_everything",

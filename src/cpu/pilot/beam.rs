@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
-use crate::camera::lens::camera_ray;
-use crate::packed::{Frame, PackedScene};
+use crate::camera::lens::{camera_ray_from, lens_undistort};
+use crate::camera::shutter::{CameraPose, camera_pose, camera_pose_at};
+use crate::packed::{FRAME_SHUTTER, Frame, PackedScene, SHUTTER_POSES};
 
 /// All rays of one pixel: at axis depth z they lie within `radius(z)` of the pinhole ray through the pixel's centre.
 pub struct Beam {
@@ -16,6 +17,8 @@ pub struct Beam {
     footprint: f32,
     aperture_radius: f32,
     inv_focus_distance: f32,
+    /// How far the camera moves from where it is in the middle of the row's exposure, metres.
+    shake: f32,
 }
 
 /// Rounding and the curvature of the distortion inside one pixel.
@@ -23,24 +26,60 @@ const FOOTPRINT_MARGIN: f32 = 1.1;
 /// A square of half-width 1 reaches this far.
 const SQUARE_REACH: f32 = std::f32::consts::SQRT_2;
 
+/// Where the camera is in the middle, at the ends and at the corners of its way while a row is exposed.
+struct RowPoses {
+    all: [CameraPose; SHUTTER_POSES + 3],
+    count: usize,
+}
+
+impl RowPoses {
+    fn of(frame: &Frame, row: u32) -> Self {
+        let mut poses = Self {
+            all: [camera_pose(frame); SHUTTER_POSES + 3],
+            count: 1,
+        };
+        if frame.flags & FRAME_SHUTTER == 0 {
+            return poses;
+        }
+        let opens = row as f32 * frame.shutter_row;
+        let closes = opens + frame.shutter_open;
+        poses.all[0] = camera_pose_at(frame, 0.5 * (opens + closes));
+        let corners = (0..SHUTTER_POSES).map(|i| i as f32 / (SHUTTER_POSES - 1) as f32);
+        let inside = corners.filter(|share| (opens..=closes).contains(share));
+        for share in [opens, closes].into_iter().chain(inside) {
+            poses.all[poses.count] = camera_pose_at(frame, share);
+            poses.count += 1;
+        }
+        poses
+    }
+}
+
 impl Beam {
     pub fn of_pixel(frame: &Frame, pinhole: &Frame, pixel: u32) -> Self {
-        let x = (pixel % frame.width) as f32;
-        let y = (pixel / frame.width) as f32;
-        let axis = -Vec3::new(
-            frame.camera_back[0],
-            frame.camera_back[1],
-            frame.camera_back[2],
-        );
-        let centre = camera_ray(pinhole, x + 0.5, y + 0.5, 0.5, 0.5);
+        let (row, column) = (pixel / frame.width, pixel % frame.width);
+        let (x, y) = (column as f32, row as f32);
+        let poses = RowPoses::of(frame, row);
+        let middle = poses.all[0];
+        let axis = -middle.back;
+        let centre = camera_ray_from(pinhole, &middle, x + 0.5, y + 0.5, 0.5, 0.5);
         let at_depth_1 = |d: Vec3| d / d.dot(axis).max(1e-6);
-        let footprint = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
-            .iter()
-            .map(|(dx, dy)| {
-                at_depth_1(camera_ray(pinhole, x + dx, y + dy, 0.5, 0.5).direction)
-                    .distance(at_depth_1(centre.direction))
-            })
-            .fold(0.0, f32::max);
+        let ahead = at_depth_1(centre.direction);
+        let [fx, fy, cx, cy] = frame.intrinsics;
+        // The distortion is the same wherever the camera is.
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+            .map(|(dx, dy)| lens_undistort(frame, (x + dx - cx) / fx, (y + dy - cy) / fy));
+        let (mut footprint, mut shake) = (0.0f32, 0.0f32);
+        for pose in &poses.all[..poses.count] {
+            // What a step of the camera does to the ray at a given depth, and what the lens's plane does that turns with it.
+            let step = pose.position.distance(middle.position);
+            let turn = 2.0 * frame.aperture_radius * pose.back.distance(middle.back);
+            for ideal in corners {
+                let direction =
+                    at_depth_1(pose.right * ideal[0] - (pose.up * ideal[1] + pose.back));
+                footprint = footprint.max(direction.distance(ahead));
+                shake = shake.max((step + turn) * (1.0 + direction.length()));
+            }
+        }
         Self {
             origin: centre.origin,
             direction: centre.direction,
@@ -48,6 +87,7 @@ impl Beam {
             footprint: footprint * FOOTPRINT_MARGIN,
             aperture_radius: frame.aperture_radius * SQUARE_REACH,
             inv_focus_distance: frame.inv_focus_distance,
+            shake: shake * FOOTPRINT_MARGIN,
         }
     }
 
@@ -56,6 +96,7 @@ impl Beam {
         let blur = |z: f32| {
             self.aperture_radius * (1.0 - z * self.inv_focus_distance).abs()
                 + self.footprint * z.max(0.0)
+                + self.shake
         };
         blur(z0.max(0.0)).max(blur(z1.max(0.0)))
     }
@@ -70,8 +111,12 @@ impl Beam {
         off_ray <= (radius + self.radius(z - radius, z + radius)) * 1.001
     }
 
-    pub fn may_meet_spheres(&self, frame: &Frame) -> bool {
-        frame.spheres[..frame.sphere_count as usize]
+    pub fn may_meet_virtual(&self, scene: &PackedScene) -> bool {
+        let spheres = match scene.swept_spheres.as_slice() {
+            [] => &scene.frame.spheres[..scene.frame.sphere_count as usize],
+            swept => swept,
+        };
+        spheres
             .iter()
             .any(|s| self.may_meet_sphere(Vec3::new(s[0], s[1], s[2]), s[3]))
     }

@@ -30,8 +30,9 @@ const SEED: u32 = 0x9d2c_5681;
 /// Fills `scene.pixels`. The same for every seed, sample range and backend.
 pub fn pilot(scene: &mut PackedScene) {
     let (width, height) = (scene.frame.width as usize, scene.frame.height as usize);
-    let nothing_virtual =
-        scene.frame.sphere_count == 0 && !scene.lights.iter().any(|l| l.side == 1);
+    let nothing_virtual = scene.frame.sphere_count == 0
+        && scene.swept_spheres.is_empty()
+        && !scene.lights.iter().any(|l| l.side == 1);
     if nothing_virtual {
         scene.pixels = vec![PixelInfo::uniform(PIXEL_OUT_OF_REACH); width * height];
         return;
@@ -81,7 +82,7 @@ pub fn pilot(scene: &mut PackedScene) {
 }
 
 fn flags_of(scene: &PackedScene, beam: &Beam) -> u32 {
-    if beam.may_meet_spheres(&scene.frame) {
+    if beam.may_meet_virtual(scene) {
         PIXEL_BEAM_MAY_MEET_VIRTUAL
     } else if beam.may_meet_real(scene) {
         0

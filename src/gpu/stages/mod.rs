@@ -4,6 +4,7 @@
 
 mod antialias;
 mod cartoon;
+mod copies;
 mod noise;
 #[cfg(test)]
 mod tests;
@@ -24,6 +25,7 @@ pub const STAGE_KERNELS: &[(&str, &str)] = &[
     ("stages_cartoon", "stage_filter"),
     ("stages_cartoon", "stage_respond"),
     ("stages_cartoon", "stage_compose"),
+    ("stages_copies", "stage_copies"),
     ("stages_flow", "stage_tensor"),
     ("stages_flow", "stage_blur_rows"),
     ("stages_flow", "stage_blur_columns"),

@@ -6,6 +6,7 @@ use wgpu::naga;
 
 use super::antialias::AntialiasParams;
 use super::cartoon::{CartoonParams, FlowParams};
+use super::copies::CopiesParams;
 use super::noise::NoiseParams;
 use super::{GpuStages, STAGE_KERNELS};
 use crate::film::Picture;
@@ -14,12 +15,13 @@ use crate::gpu::kernel::reflect_bindings;
 use crate::gpu::{Composer, Features};
 use crate::math::{hash_combine, uniform_from_bits};
 use crate::scene::{
-    AntialiasSettings, CartoonSettings, CartoonStyle, NoiseFit, NoiseMethod, NoiseProfile,
-    NoiseSettings,
+    AntialiasSettings, CartoonSettings, CartoonStyle, MotionBlurSettings, NoiseFit, NoiseMethod,
+    NoiseProfile, NoiseSettings,
 };
 use crate::stages::EncodedImage;
 use crate::stages::antialias::antialias;
 use crate::stages::cartoon::cartoon;
+use crate::stages::copies::{Copies, draw_copies};
 use crate::stages::noise::{NoiseInput, NoiseStage};
 
 const SIZE: (u32, u32) = (101, 67);
@@ -99,6 +101,7 @@ fn every_kernel_is_valid_and_its_params_are_the_hosts() {
     let sizes = [
         ("stages_antialias", 0, size_of::<AntialiasParams>()),
         ("stages_cartoon", 0, size_of::<CartoonParams>()),
+        ("stages_copies", 0, size_of::<CopiesParams>()),
         ("stages_flow", 0, size_of::<CartoonParams>()),
         ("stages_flow", 1, size_of::<FlowParams>()),
         ("stages_noise", 0, size_of::<NoiseParams>()),
@@ -128,6 +131,44 @@ fn every_kernel_is_valid_and_its_params_are_the_hosts() {
             assert_eq!(*size, binding.stride as usize, "{kernel}");
         }
     }
+}
+
+#[test]
+fn the_copies_are_the_same() {
+    let Some(gpu) = stages() else { return };
+    let settings = MotionBlurSettings::default();
+    let copies = |blur| Copies::of(blur, &settings).expect("moves enough");
+    let layer = |stream: u32| -> Vec<[f32; 4]> {
+        let covered = mask();
+        (picture(stream).linear.iter().zip(covered))
+            .map(|([r, g, b], a)| [r * a, g * a, b * a, a])
+            .collect()
+    };
+    let (far, near) = (layer(3), layer(4));
+    let canvas: Vec<[f32; 4]> = (picture(5).linear.iter())
+        .map(|[r, g, b]| [*r, *g, *b, 0.0])
+        .collect();
+    let layers = [
+        (far.as_slice(), copies([17.3, -9.1])),
+        (near.as_slice(), copies([-5.2, 0.4])),
+        (near.as_slice(), Copies::ONE),
+    ];
+    let mut on_cpu = canvas.clone();
+    for (layer, copies) in &layers {
+        draw_copies(&mut on_cpu, SIZE, layer, copies);
+    }
+    let mut on_gpu = canvas.clone();
+    gpu.draw_copies(&mut on_gpu, SIZE, &layers).expect("runs");
+    let apart = |a: &[[f32; 4]], b: &[[f32; 4]]| {
+        let pairs = a.as_flattened().iter().zip(b.as_flattened());
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    let worst = apart(&on_cpu, &on_gpu);
+    assert!(worst < 1e-5, "{worst}");
+    let mut other = canvas.clone();
+    gpu.draw_copies(&mut other, SIZE, &layers[..2])
+        .expect("runs");
+    assert!(apart(&on_cpu, &other) > 0.01, "control: a layer less");
 }
 
 #[test]

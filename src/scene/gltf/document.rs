@@ -66,6 +66,8 @@ pub(super) struct Document {
     pub extensions_used: Vec<String>,
     pub extensions_required: Vec<String>,
     pub folder: PathBuf,
+    /// Not looked at before one is asked for.
+    animations: Value,
     accessors: Vec<json::Accessor>,
     views: Vec<json::buffer::View>,
     buffers: Vec<json::Buffer>,
@@ -104,6 +106,7 @@ impl Document {
             extensions_used: list(&json, "extensionsUsed")?,
             extensions_required: list(&json, "extensionsRequired")?,
             folder,
+            animations: json.get("animations").cloned().unwrap_or_default(),
             accessors: list(&json, "accessors")?,
             views: list(&json, "bufferViews")?,
             loaded: buffers.iter().map(|_| OnceCell::new()).collect(),
@@ -111,6 +114,14 @@ impl Document {
             bin,
             decoded: Cell::new(0),
         })
+    }
+
+    pub fn animations(&self) -> Result<Vec<json::Animation>, Problem> {
+        if self.animations.is_null() {
+            return Ok(Vec::new());
+        }
+        Vec::deserialize(&self.animations)
+            .map_err(|error| malformed("animations", error.to_string()))
     }
 
     /// The files that buffers and images name, whether or not they exist and are drawn.

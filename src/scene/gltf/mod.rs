@@ -4,9 +4,10 @@
 //! Every index, offset and length is checked here before it is followed, so a broken file is an error and never a panic.
 //!
 //! Only what the drawn scene reaches is read: a damaged image that nothing shows does no harm. Drawn are the nodes of the
-//! default scene, or of the first scene where no default is named, or all root nodes where there is no scene. Animations, skins
-//! and morph targets are not applied; occlusion textures are not read, because the light transport computes what they fake.
+//! default scene, or of the first scene where no default is named, or all root nodes where there is no scene. A node
+//! animation is applied where one is asked for, skins and morph targets are not; occlusion textures are not read, because the light transport computes what they fake.
 
+mod animation;
 mod container;
 mod document;
 mod image;
@@ -16,12 +17,14 @@ mod notes;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DMat4, DQuat, DVec3};
 use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
 use gltf::json::validation::Checked;
 
 use super::Instance;
+use super::animation::InstanceAnimation;
 use container::malformed;
 use document::{Document, Node};
 use notes::{Note, Notes};
@@ -153,13 +156,21 @@ const COMPRESSION_EXTENSIONS: &[&str] = &[
 /// A [`GltfError`] of one line where the file is unreadable or broken, refers to something that does not exist, holds a
 /// number that is not finite, or needs an extension that mixray does not have (with the way to convert it).
 pub fn load_gltf(path: &Path) -> Result<GltfScene, GltfError> {
-    load(path).map_err(|problem| GltfError {
+    load_animated(path, None)
+}
+
+/// [`load_gltf`] with the animation of that name or number on the instances that it moves.
+///
+/// # Errors
+/// As [`load_gltf`]; or there is no such animation, or it is broken.
+pub fn load_animated(path: &Path, animation: Option<&str>) -> Result<GltfScene, GltfError> {
+    load(path, animation).map_err(|problem| GltfError {
         path: path.to_path_buf(),
         problem,
     })
 }
 
-fn load(path: &Path) -> Result<GltfScene, Problem> {
+fn load(path: &Path, wanted: Option<&str>) -> Result<GltfScene, Problem> {
     let container = container::read_container(path)?;
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let document = Document::new(container, folder)?;
@@ -172,7 +183,12 @@ fn load(path: &Path) -> Result<GltfScene, Problem> {
         files: document.files(),
         ..GltfScene::default()
     };
-    for (index, object_from_node) in placed_nodes(&document, &mut notes)? {
+    let placed = placed_nodes(&document, &mut notes)?;
+    let animation = wanted
+        .map(|wanted| animation::read(&document, wanted))
+        .transpose()?
+        .map(Arc::new);
+    for (index, object_from_node) in placed {
         let node = &document.nodes[index];
         if let Some(placed) = &node.extensions.light {
             scene
@@ -196,6 +212,12 @@ fn load(path: &Path) -> Result<GltfScene, Problem> {
             scene.has_materials |= drawn.material.is_some();
             scene.instances.push(Instance {
                 object_from_local: object_from_node,
+                animation: (animation.as_ref())
+                    .filter(|animation| animation.moves(index))
+                    .map(|animation| InstanceAnimation {
+                        animation: Arc::clone(animation),
+                        node: index,
+                    }),
                 primitive: drawn.primitive.clone(),
                 material,
             });

@@ -1,6 +1,9 @@
 //! Scene files that were damaged at random: whatever is done to a valid file, it loads or is refused in one line with its place.
 
-use super::super::{error::Source, file::read_scene};
+use super::super::{
+    error::Source,
+    file::{Given, read_scene},
+};
 use crate::math::{hash_combine, hash_u32};
 
 const VALID: &str = r#"
@@ -48,7 +51,7 @@ sampler = "cmj"
 fn read_text(text: &str) -> Result<(), String> {
     let source = Source::new("scene.toml".as_ref(), text.as_bytes().to_vec());
     source
-        .and_then(|source| read_scene(&source))
+        .and_then(|source| read_scene(&source, Given::default()))
         .map(|_| ())
         .map_err(|error| error.to_string())
 }

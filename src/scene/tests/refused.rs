@@ -440,9 +440,31 @@ fn meshes_that_cannot_be_read() {
 }
 
 #[test]
-fn stages_that_are_not_applied() {
-    for table in ["shutter", "motion_blur"] {
-        assert_refused_with_camera(&format!("[@@{table}]\n"), "remove the table");
+fn motion() {
+    for (text, part) in [
+        ("@@[shutter]\n", "lacks `exposure_secs`"),
+        ("[shutter]\nexposure_secs = @@-1\n", "from 0 to 1e6"),
+        ("[shutter]\nexposure_secs = @@nan\n", "from 0 to 1e6"),
+        ("[shutter]\nexposure_secs = 1\nsamples = @@0\n", "from 1"),
+        (
+            "[motion_blur]\nmethod = @@\"copy\"\n",
+            "did you mean `copies`",
+        ),
+        ("[motion_blur]\nstep_px = @@0\n", "0.1 to 1000"),
+        (
+            "[[virtual]]\nshape = \"sphere\"\n@@[[virtual.motion]]\n",
+            "lacks `time_secs`",
+        ),
+        (
+            "[[virtual]]\nshape = \"sphere\"\n[[virtual.motion]]\ntime_secs = 0\nscale = @@0\n",
+            "other than 0",
+        ),
+        (
+            "[[real]]\nshape = \"sphere\"\n[[real.@@motion]]\ntime_secs = 0\n",
+            "[[virtual]] only",
+        ),
+    ] {
+        assert_refused_with_camera(text, part);
     }
 }
 

@@ -1,0 +1,100 @@
+//! Where the camera is while the shutter is open. WGSL twin: `shaders/shutter.wgsl`.
+//!
+//! The way is cut into equal pieces of time; within one the position moves along a straight line and the orientation's quaternion too, made
+//! a unit again.
+
+use glam::{DMat4, DQuat, DVec3, Vec3};
+
+use super::sampler::{SampleKey, sample_4d};
+use crate::packed::{FRAME_SHUTTER_ORDERED, Frame, SHUTTER_POSES};
+
+/// Pixel and lens are set 0; the vertices' sets begin at 7.
+const SHUTTER_SET: u32 = 1;
+
+/// Anchor-relative position in metres, and unit axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraPose {
+    pub position: Vec3,
+    pub right: Vec3,
+    pub up: Vec3,
+    pub back: Vec3,
+}
+
+/// The pose at the picture's time.
+pub fn camera_pose(frame: &Frame) -> CameraPose {
+    let xyz = |v: [f32; 4]| Vec3::new(v[0], v[1], v[2]);
+    CameraPose {
+        position: xyz(frame.camera_position),
+        right: xyz(frame.camera_right),
+        up: xyz(frame.camera_up),
+        back: xyz(frame.camera_back),
+    }
+}
+
+/// When a sample of that row is taken: a share of the time from the opening of the first row to the closing of the last. `index` counts
+/// the pixel's samples; where they are ordered in time, each has its own slice of the exposure.
+pub fn shutter_share(frame: &Frame, key: SampleKey, index: u32, row: u32) -> f32 {
+    let mut within = sample_4d(key, SHUTTER_SET)[0];
+    if frame.flags & FRAME_SHUTTER_ORDERED != 0 {
+        within = (index as f32 + within) / key.total as f32;
+    }
+    row as f32 * frame.shutter_row + within.min(1.0) * frame.shutter_open
+}
+
+/// The pose at a share of the shutter's time, 0 to 1.
+pub fn camera_pose_at(frame: &Frame, share: f32) -> CameraPose {
+    let pieces = (SHUTTER_POSES - 1) as f32;
+    let x = share.clamp(0.0, 1.0) * pieces;
+    let piece = x.floor().min(pieces - 1.0);
+    let along = x - piece;
+    let first = 2 * piece as usize;
+    let [p0, q0, p1, q1] = [0, 1, 2, 3].map(|i| frame.shutter_poses[first + i]);
+    let mix = |a: [f32; 4], b: [f32; 4]| [0, 1, 2, 3].map(|i| a[i] + (b[i] - a[i]) * along);
+    let p = mix(p0, p1);
+    let q = mix(q0, q1);
+    let length = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
+    let [x, y, z, w] = q.map(|component| component / length);
+    CameraPose {
+        position: Vec3::new(p[0], p[1], p[2]),
+        right: Vec3::new(
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y + w * z),
+            2.0 * (x * z - w * y),
+        ),
+        up: Vec3::new(
+            2.0 * (x * y - w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z + w * x),
+        ),
+        back: Vec3::new(
+            2.0 * (x * z + w * y),
+            2.0 * (y * z - w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        ),
+    }
+}
+
+/// Fills the frame's poses from those at equal steps of the shutter's time; false, and nothing changes, if they are all one.
+pub fn frame_poses(
+    world_from_camera: &[DMat4; SHUTTER_POSES],
+    anchor: DVec3,
+    frame: &mut Frame,
+) -> bool {
+    let first = world_from_camera[0];
+    if world_from_camera.iter().all(|pose| *pose == first) {
+        return false;
+    }
+    let mut before = DQuat::from_mat4(&first);
+    for (i, pose) in world_from_camera.iter().enumerate() {
+        let mut turned = DQuat::from_mat4(pose);
+        // Of the two quaternions of a rotation, the one nearer to the last, so that what lies between is short.
+        if turned.dot(before) < 0.0 {
+            turned = -turned;
+        }
+        before = turned;
+        let position = pose.w_axis.truncate() - anchor;
+        frame.shutter_poses[2 * i] = position.as_vec3().extend(0.0).to_array();
+        frame.shutter_poses[2 * i + 1] = turned.as_quat().to_array();
+    }
+    true
+}

@@ -1,0 +1,231 @@
+//! `mixray sequence --check`: poses against points that were seen.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::Path;
+
+use bytemuck::Zeroable;
+use glam::DVec3;
+
+use super::Arguments;
+use super::plan::{Files, known_rate, views};
+use crate::camera::lens::{camera_project, frame_camera, project};
+use crate::cli::{Failure, Outcome, print};
+use crate::packed::Frame;
+use crate::scene::trajectory::{EntryKey, FrameName, KnownPoint, Trajectory};
+use crate::scene::{Camera, Lens};
+use crate::video::FrameSource;
+
+/// Frames with the largest errors that are named.
+const NAMED: usize = 5;
+
+/// Of one frame.
+#[derive(Default)]
+struct Errors {
+    /// Pixels, seen against projected.
+    seen: Vec<f64>,
+    /// Pixels, the renderer's projection against that of the pose in full precision.
+    own: f64,
+}
+
+pub(super) fn run(arguments: &Arguments, points: Option<&Path>) -> Result<Outcome, Failure> {
+    let files = Files::read(arguments)?;
+    let points = match points {
+        Some(path) => read_points(path)?,
+        None => files.trajectory.known_points.clone(),
+    };
+    if points.is_empty() {
+        return Err(Failure(format!(
+            "{}: it holds no points that were seen; expected COLMAP's points3D.txt beside images.txt, or a table of points; give --check POINTS.csv",
+            files.trajectory.path.display()
+        )));
+    }
+    let source = arguments
+        .frames
+        .as_deref()
+        .map(FrameSource::open)
+        .transpose()?;
+    let is_stream = source.as_ref().is_some_and(FrameSource::is_stream);
+    let rate = known_rate(arguments, &files.trajectory, source.as_ref());
+    let views = views(&files.trajectory, rate, is_stream)?;
+    let mut errors: BTreeMap<String, Errors> = BTreeMap::new();
+    let (mut used, mut without_pose, mut behind) = (0u64, 0u64, 0u64);
+    let mut own_camera: Option<(Camera, Lens)> = None;
+    for point in &points {
+        let name = frame_of(&point.key, &files.trajectory);
+        let view = views.of(&name)?;
+        let Some(pose) = view.world_from_camera else {
+            without_pose += 1;
+            continue;
+        };
+        let (camera, lens) = match (files.intrinsics_of(&view), &own_camera) {
+            (Some(intrinsics), _) => {
+                let size = intrinsics
+                    .size
+                    .or_else(|| source.as_ref()?.header().map(|h| (h.width, h.height)));
+                let size = size.unwrap_or((32768, 32768));
+                let camera = Camera {
+                    width: size.0,
+                    height: size.1,
+                    fx: intrinsics.fx,
+                    fy: intrinsics.fy,
+                    cx: intrinsics.cx,
+                    cy: intrinsics.cy,
+                    distortion: intrinsics.distortion,
+                    world_from_camera: pose,
+                };
+                (camera, None)
+            }
+            (None, Some((camera, lens))) => (camera.clone(), Some(*lens)),
+            (None, None) => {
+                let scene = files.scene(arguments, &view, None)?;
+                own_camera = Some((scene.camera.clone(), scene.lens));
+                (scene.camera, Some(scene.lens))
+            }
+        };
+        let camera = Camera {
+            world_from_camera: pose,
+            ..camera
+        };
+        let Some(projected) = project(&camera, point.world) else {
+            behind += 1;
+            continue;
+        };
+        used += 1;
+        let entry = errors.entry(name.label.clone()).or_default();
+        let pixel = projected.truncate();
+        if let Some([x, y]) = point.seen {
+            entry.seen.push(pixel.distance(glam::DVec2::new(x, y)));
+        }
+        entry.own = entry.own.max(own_error(&camera, lens, point.world, pixel));
+    }
+    let text = table(&errors, used, without_pose, behind);
+    print(&text);
+    let worst = errors
+        .values()
+        .flat_map(|e| e.seen.iter().copied())
+        .fold(0.0, f64::max);
+    Ok(match worst <= arguments.max_error {
+        true => Outcome::Done,
+        false => Outcome::CheckFailed,
+    })
+}
+
+/// Distance between where the renderer's own arithmetic sees a point and where the pose puts it, pixels.
+fn own_error(camera: &Camera, lens: Option<Lens>, world: DVec3, pixel: glam::DVec2) -> f64 {
+    let anchor = camera.world_from_camera.w_axis.truncate();
+    let lens = lens.unwrap_or(Lens::PINHOLE);
+    let mut frame = Frame::zeroed();
+    frame_camera(camera, &lens, anchor, &mut frame);
+    let seen = camera_project(&frame, (world - anchor).as_vec3());
+    pixel.distance(glam::DVec2::new(seen.px.into(), seen.py.into()))
+}
+
+fn table(errors: &BTreeMap<String, Errors>, used: u64, without_pose: u64, behind: u64) -> String {
+    let mut all: Vec<f64> = errors
+        .values()
+        .flat_map(|e| e.seen.iter().copied())
+        .collect();
+    all.sort_by(f64::total_cmp);
+    let mut text = format!(
+        "{used} points in {} frames; {without_pose} in frames without a pose, {behind} not in front of the camera\n",
+        errors.len()
+    );
+    let square_mean = |values: &[f64]| {
+        (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
+    };
+    if let Some(largest) = all.last() {
+        let _ = writeln!(
+            text,
+            "reprojection error in pixels: rms {:.3}, median {:.3}, largest {largest:.3}",
+            square_mean(&all),
+            all[all.len() / 2]
+        );
+    }
+    let own = errors.values().map(|e| e.own).fold(0.0, f64::max);
+    let _ = writeln!(
+        text,
+        "the renderer's own projection is off by at most {own:.5} px"
+    );
+    let mut frames: Vec<(&String, f64)> = errors
+        .iter()
+        .filter(|(_, e)| !e.seen.is_empty())
+        .map(|(name, e)| (name, square_mean(&e.seen)))
+        .collect();
+    frames.sort_by(|a, b| b.1.total_cmp(&a.1));
+    for (name, rms) in frames.into_iter().take(NAMED) {
+        let _ = writeln!(text, "{name}: rms {rms:.3} px");
+    }
+    text
+}
+
+fn frame_of(key: &EntryKey, trajectory: &Trajectory) -> FrameName {
+    match key {
+        EntryKey::Number(number) => FrameName {
+            label: format!("frame {number}"),
+            file: None,
+            number: *number,
+        },
+        EntryKey::Name(name) => FrameName {
+            label: name.clone(),
+            file: Some(name.clone()),
+            number: 0,
+        },
+        EntryKey::Time => FrameName {
+            label: trajectory.path.display().to_string(),
+            file: None,
+            number: 0,
+        },
+    }
+}
+
+/// `frame,x_px,y_px,x_m,y_m,z_m` a line; `frame` is a number or a file name, the pixel may be empty.
+fn read_points(path: &Path) -> Result<Vec<KnownPoint>, Failure> {
+    let failure =
+        |line: usize, problem: String| Failure(format!("{}:{line}: {problem}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        Failure(format!(
+            "{}: it cannot be read ({error}); expected a table of points; correct the path",
+            path.display()
+        ))
+    })?;
+    let mut points = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let words: Vec<&str> = line.split(',').map(str::trim).collect();
+        if line.trim().is_empty() || line.starts_with('#') || (index == 0 && words[0] == "frame") {
+            continue;
+        }
+        let [frame, x_px, y_px, x, y, z] = words.as_slice() else {
+            return Err(failure(
+                index + 1,
+                format!(
+                    "it has {} columns; expected frame,x_px,y_px,x_m,y_m,z_m; complete the line",
+                    words.len()
+                ),
+            ));
+        };
+        let number = |word: &str| match word.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(x),
+            _ => Err(failure(
+                index + 1,
+                format!(
+                    "\"{word}\" is no finite number; expected frame,x_px,y_px,x_m,y_m,z_m; correct the line"
+                ),
+            )),
+        };
+        let seen = match (x_px.is_empty(), y_px.is_empty()) {
+            (true, true) => None,
+            _ => Some([number(x_px)?, number(y_px)?]),
+        };
+        points.push(KnownPoint {
+            key: match frame.parse() {
+                Ok(number) => EntryKey::Number(number),
+                Err(_) => EntryKey::Name((*frame).to_owned()),
+            },
+            place: format!("line {}", index + 1),
+            world: DVec3::new(number(x)?, number(y)?, number(z)?),
+            seen,
+        });
+    }
+    Ok(points)
+}

@@ -1,0 +1,403 @@
+//! The frames one after the other.
+
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use glam::DVec3;
+
+use super::Arguments;
+use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
+use super::report::{Frames, Seconds, Stats};
+use crate::cli::progress::Steps;
+use crate::cli::{Failure, Outcome, interrupt, print, say};
+use crate::gpu::GpuStages;
+use crate::output::{check_writable, write_text};
+use crate::packed::next_anchor;
+use crate::renderer::{Budget, FrameEdit, PreviousView, RayTotals, Renderer, RendererOptions};
+use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
+use crate::scene::{Camera, Exposure, Lens, MotionBlurMethod, Scene, fingerprint_of};
+use crate::stages::{Finished, finish};
+use crate::video::{FrameSink, FrameSource, Header, SinkPlan, VideoFrame};
+
+/// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
+const REACH_FRAMES: f64 = 1.5;
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let files = Files::read(arguments)?;
+    let frames = arguments.frames.as_deref();
+    let output = arguments.output.as_deref().unwrap_or(Path::new("-"));
+    let frames = frames.ok_or_else(|| {
+        Failure(
+            "--frames is absent; expected a folder of pictures, a .y4m file, or -; add it"
+                .to_owned(),
+        )
+    })?;
+    refuse_same_place(frames, output)?;
+    if let Some(path) = &arguments.stats {
+        check_writable(path)?;
+    }
+    let mut source = FrameSource::open(frames)?;
+    let rate = known_rate(arguments, &files.trajectory, Some(&source));
+    let views = views(&files.trajectory, rate, source.is_stream())?;
+    check_frames(arguments, &source, &views)?;
+    let count = source.names().map(|names| {
+        names
+            .iter()
+            .filter(|name| in_range(arguments, name))
+            .count()
+    });
+    if let (Some((from, to)), None) = (arguments.focus_pull, &count)
+        && arguments.range.is_none()
+    {
+        return Err(Failure(format!(
+            "--focus-pull {from}..{to} of a stream whose length is not known; expected a range; give --range"
+        )));
+    }
+    let interrupted = interrupt::watch()?;
+    let bar = Steps::new(count.unwrap_or(0) as u64);
+    let mut sequence = Sequence {
+        arguments,
+        files: &files,
+        views: &views,
+        rate,
+        span: span(arguments, &source),
+        output,
+        started: None,
+        frames: Frames::default(),
+        seconds: Seconds::default(),
+        rays: RayTotals::default(),
+        non_finite_samples: 0,
+    };
+    let outcome = loop {
+        if interrupted.is_set() {
+            break Outcome::Interrupted;
+        }
+        let begin = Instant::now();
+        let wanted = |name: &FrameName| in_range(arguments, name);
+        let Some((name, frame)) = source.next(&wanted)? else {
+            break Outcome::Done;
+        };
+        sequence.seconds.load += begin.elapsed().as_secs_f64();
+        if arguments.range.is_some_and(|(_, to)| name.number >= to) {
+            break Outcome::Done;
+        }
+        let Some(frame) = frame else { continue };
+        bar.say(&name.label);
+        let header = source.header().cloned();
+        if !sequence.take(&name, frame, header, &|| interrupted.is_set())? {
+            break Outcome::Interrupted;
+        }
+        bar.step();
+    };
+    bar.clear();
+    sequence.end(outcome)
+}
+
+/// The first and the last frame's number, where they are known: the focus is pulled between them.
+fn span(arguments: &Arguments, source: &FrameSource) -> Option<(u32, u32)> {
+    if let Some((from, to)) = arguments.range {
+        return Some((from, to - 1));
+    }
+    let names = source.names()?;
+    Some((names.first()?.number, names.last()?.number))
+}
+
+fn refuse_same_place(frames: &Path, output: &Path) -> Result<(), Failure> {
+    let same = match (frames.canonicalize(), output.canonicalize()) {
+        (Ok(frames), Ok(output)) => frames == output,
+        _ => false,
+    };
+    if !same {
+        return Ok(());
+    }
+    Err(Failure(format!(
+        "{}: the frames would be replaced; expected another place for the output; give another -o",
+        output.display()
+    )))
+}
+
+struct Sequence<'a> {
+    arguments: &'a Arguments,
+    files: &'a Files,
+    views: &'a Views<'a>,
+    /// Frames a second, where known.
+    rate: Option<f64>,
+    span: Option<(u32, u32)>,
+    output: &'a Path,
+    started: Option<Started>,
+    frames: Frames,
+    seconds: Seconds,
+    rays: RayTotals,
+    non_finite_samples: u64,
+}
+
+/// What the first frame brings to life.
+struct Started {
+    sink: FrameSink,
+    size: (u32, u32),
+    lens: Lens,
+    /// The scene file's own, where nobody else brings intrinsics.
+    camera: Camera,
+    /// Not before the first posed frame.
+    renderer: Option<Renderer>,
+    scene: Option<Scene>,
+    gpu: Option<GpuStages>,
+    anchor: Option<DVec3>,
+    seed: u32,
+    notes: usize,
+}
+
+impl Sequence<'_> {
+    /// Renders, keeps or passes a frame on; false if it was interrupted.
+    fn take(
+        &mut self,
+        name: &FrameName,
+        frame: VideoFrame,
+        header: Option<Header>,
+        interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<bool, Failure> {
+        let view = self.views.of(name)?;
+        for warning in &frame.warnings {
+            say("warning", &format!("{}: {warning}", name.label));
+        }
+        let size = (frame.photo.width, frame.photo.height);
+        let started = match self.started.take() {
+            Some(started) => started,
+            None => self.start(&view, &frame, header)?,
+        };
+        let started = self.started.insert(started);
+        if size != started.size {
+            return Err(Failure(format!(
+                "{}: it has {} x {} pixels where the frames before have {} x {}; expected frames of one size; scale it, then go on with the same command",
+                name.label, size.0, size.1, started.size.0, started.size.1
+            )));
+        }
+        let position = view.world_from_camera.map(|pose| pose.w_axis.truncate());
+        if let Some(position) = position {
+            // The same for every frame whichever run renders it.
+            started.anchor = Some(next_anchor(started.anchor, position));
+        }
+        let there = started.sink.has(name);
+        let Some(world_from_camera) = view.world_from_camera else {
+            if there {
+                self.frames.kept += 1;
+                return Ok(true);
+            }
+            let begin = Instant::now();
+            started.sink.pass(name, &frame)?;
+            self.seconds.write += begin.elapsed().as_secs_f64();
+            self.frames.passed_through += 1;
+            return Ok(true);
+        };
+        let camera = match self.files.intrinsics_of(&view) {
+            Some(intrinsics) => (intrinsics.camera(size, world_from_camera)).map_err(|problem| {
+                Failure(format!("{}: {problem}; expected intrinsics of the frames' size; calibrate at that size, or scale the frames", name.label))
+            })?,
+            None => Camera {
+                world_from_camera,
+                ..started.camera.clone()
+            },
+        };
+        let time_secs = view.time_secs.unwrap_or(0.0);
+        let near = near(self.views, time_secs);
+        let previous = near
+            .key_before(time_secs)
+            .map(|(time_secs, pose)| PreviousView {
+                world_from_camera: pose,
+                time_secs,
+            });
+        let lens = Lens {
+            focus_distance_m: pulled_focus(self.arguments.focus_pull, self.span, name.number)
+                .or(view.focus_distance_m)
+                .unwrap_or(started.lens.focus_distance_m),
+            ..started.lens
+        };
+        if let Some(mut scene) = started.scene.take() {
+            let begin = Instant::now();
+            // Fitted once, to the first posed frame of the range, whether or not that one is finished.
+            scene.photo = Some(frame.photo.clone());
+            scene.camera = camera.clone();
+            let renderer = Renderer::new(scene, RendererOptions::default())?;
+            let seconds = renderer.seconds();
+            self.seconds.compile += seconds.compile;
+            self.seconds.first_build += begin.elapsed().as_secs_f64() - seconds.compile;
+            started.gpu = renderer.gpu_device().cloned().map(GpuStages::new);
+            started.renderer = Some(renderer);
+        }
+        if there {
+            self.frames.kept += 1;
+            return Ok(true);
+        }
+        let Some(renderer) = &mut started.renderer else {
+            return Ok(true);
+        };
+        let begin = Instant::now();
+        renderer.set_frame(FrameEdit {
+            photo: Some(frame.photo.clone()),
+            camera,
+            lens,
+            camera_path: near,
+            time_secs,
+            seed: started.seed.wrapping_add(name.number),
+            anchor: started.anchor,
+        })?;
+        self.seconds.edit += begin.elapsed().as_secs_f64();
+        let begin = Instant::now();
+        renderer.advance(Budget::Complete, interrupted, &mut |_| ())?;
+        self.seconds.render += begin.elapsed().as_secs_f64();
+        if interrupted() {
+            return Ok(false);
+        }
+        let begin = Instant::now();
+        let picture = renderer.picture();
+        self.seconds.composite += begin.elapsed().as_secs_f64();
+        let copies = (renderer.scene().stages.motion_blur)
+            .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);
+        let motion = previous
+            .filter(|_| copies)
+            .map(|previous| renderer.picture_motion(&previous));
+        let Finished {
+            picture,
+            notes,
+            seconds,
+        } = finish(
+            picture,
+            renderer.film(),
+            renderer.scene(),
+            name.number,
+            motion.as_ref(),
+            started.gpu.as_ref(),
+        );
+        self.seconds.add_stages(&seconds);
+        self.frames.rendered += 1;
+        self.frames.moving += u32::from(renderer.is_moving());
+        self.non_finite_samples += renderer.film().non_finite_samples();
+        for note in renderer.notes().iter().skip(started.notes) {
+            say("note", note);
+        }
+        started.notes = renderer.notes().len();
+        if self.frames.rendered == 1 {
+            for note in &notes {
+                say("note", note);
+            }
+        }
+        let begin = Instant::now();
+        started.sink.write(name, &picture, &frame)?;
+        self.seconds.write += begin.elapsed().as_secs_f64();
+        self.rays = renderer.rays();
+        Ok(true)
+    }
+
+    fn start(
+        &self,
+        view: &FrameView,
+        frame: &VideoFrame,
+        header: Option<Header>,
+    ) -> Result<Started, Failure> {
+        let mut scene = self
+            .files
+            .scene(self.arguments, view, Some(frame.photo.clone()))?;
+        check_rate(&scene, self.rate, self.views.have_own_times())?;
+        let size = (frame.photo.width, frame.photo.height);
+        // The photograph of the moment is no part of what the frames are made with.
+        scene.photo = None;
+        let arguments = self.arguments;
+        let fits = scene.settings.exposure == Exposure::Auto;
+        let scope = match fits || arguments.focus_pull.is_some() {
+            true => format!("{:?} {:?}", arguments.range, self.span),
+            false => String::new(),
+        };
+        let poses = &self.files.trajectory;
+        let trajectory = format!(
+            "{:?} {:?} {:?} {:?}",
+            poses.entries, poses.intrinsics, self.files.intrinsics, self.rate
+        );
+        let fingerprint = fingerprint_of([
+            env!("CARGO_PKG_VERSION"),
+            &scene.fingerprint(),
+            &format!(
+                "{:?} {:?} {:?}",
+                scene.settings, scene.stages, arguments.png_bits
+            ),
+            &trajectory,
+            &format!("{:?} {scope}", arguments.focus_pull),
+        ]);
+        let sink = FrameSink::open(SinkPlan {
+            path: self.output,
+            fingerprint,
+            header: header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate)),
+            png_bits: arguments.png_bits,
+            overwrite: arguments.overwrite,
+        })?;
+        Ok(Started {
+            sink,
+            size,
+            lens: scene.lens,
+            camera: scene.camera.clone(),
+            seed: scene.settings.seed,
+            renderer: None,
+            scene: Some(scene),
+            gpu: None,
+            anchor: None,
+            notes: 0,
+        })
+    }
+
+    fn end(self, outcome: Outcome) -> Result<Outcome, Failure> {
+        let Some(started) = self.started else {
+            return Err(Failure(format!(
+                "{}: no frame of the range was found; expected at least one; correct --range",
+                self.arguments
+                    .frames
+                    .as_deref()
+                    .unwrap_or(Path::new("-"))
+                    .display()
+            )));
+        };
+        if outcome == Outcome::Done {
+            started.sink.finish()?;
+        }
+        let stats = Stats::new(
+            self.frames,
+            self.seconds,
+            self.rays,
+            self.non_finite_samples,
+            started.renderer.as_ref(),
+        );
+        if let Some(path) = &self.arguments.stats {
+            write_text(path, &serde_json::to_string_pretty(&stats)?)?;
+        }
+        let text = stats.text(&self.output.display().to_string());
+        if self.output == Path::new("-") {
+            // Standard output is the film. Without a stderr there is nobody to tell.
+            let _ = std::io::stderr().write_all(text.as_bytes());
+        } else {
+            print(&text);
+        }
+        if stats.non_finite_samples > 0 {
+            say(
+                "warning",
+                &format!(
+                    "{} samples were not finite and are left out",
+                    stats.non_finite_samples
+                ),
+            );
+        }
+        Ok(outcome)
+    }
+}
+
+/// The camera's way around a frame.
+fn near(views: &Views<'_>, time_secs: f64) -> CameraPath {
+    let spacing = views.frame_secs().unwrap_or(0.0);
+    views.path().around(time_secs, REACH_FRAMES * spacing)
+}
+
+/// At a constant rate in 1/m: what a lens barrel turns through.
+fn pulled_focus(ends: Option<(f64, f64)>, span: Option<(u32, u32)>, number: u32) -> Option<f64> {
+    let (from, to) = ends?;
+    let (first, last) = span?;
+    let share = f64::from(number - first) / f64::from((last - first).max(1));
+    Some(1.0 / ((1.0 - share) / from + share / to))
+}

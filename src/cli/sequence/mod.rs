@@ -1,0 +1,135 @@
+//! `mixray sequence`: a scene over the frames of a video, each with its own camera pose.
+
+mod check;
+mod job;
+mod plan;
+mod report;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+use super::render::{choice, png_bits};
+use super::{Failure, Outcome};
+use crate::output::PngBits;
+use crate::scene::{BackendChoice, Composite, Estimator, Overrides, SamplerKind, Settings};
+
+/// Renders a scene's virtual objects into the frames of a video
+///
+/// Flags win over the scene file. Frames that an earlier run of the same command finished are kept. Ctrl-C ends after what is finished.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Scene file (TOML); its photograph is not needed, nor are its intrinsics if the trajectory brings them
+    scene: PathBuf,
+    /// Folder of pictures, .y4m file, file of JPEG pictures one after the other, or - for Y4M on standard input
+    #[arg(long, value_name = "PATH")]
+    frames: Option<PathBuf>,
+    /// Poses: .toml or .json of this program, transforms.json of nerfstudio, COLMAP's text model (folder or images.txt), or a TUM trajectory
+    #[arg(long, value_name = "FILE")]
+    trajectory: PathBuf,
+    /// OpenCV calibration (YAML) in place of the intrinsics of trajectory and scene
+    #[arg(long, value_name = "FILE")]
+    intrinsics: Option<PathBuf>,
+    /// Folder for PNG files, .y4m file, or - for Y4M on standard output
+    #[arg(short, long, value_name = "PATH", required_unless_present = "check")]
+    output: Option<PathBuf>,
+    /// Only the frames with these numbers, FROM to TO - 1
+    #[arg(long, value_name = "FROM..TO", value_parser = frame_range)]
+    range: Option<(u32, u32)>,
+    /// Numbers may be missing among the frames of a folder
+    #[arg(long)]
+    allow_gaps: bool,
+    /// Frames a second, where neither the frames nor the trajectory tell
+    #[arg(long, value_name = "RATE", value_parser = positive)]
+    fps: Option<f64>,
+    /// Focus distance in metres over the range, from the first to the last frame, at a constant rate in 1/m
+    #[arg(long, value_name = "FROM..TO", value_parser = focus_pull)]
+    focus_pull: Option<(f64, f64)>,
+    /// Replace frames of another render
+    #[arg(long)]
+    overwrite: bool,
+    /// Check the poses against points (CSV: frame,x_px,y_px,x_m,y_m,z_m; for COLMAP its own) and render nothing
+    #[arg(long, value_name = "POINTS.csv", num_args = 0..=1)]
+    check: Option<Option<PathBuf>>,
+    /// Largest reprojection error that passes, pixels
+    #[arg(long, value_name = "PX", default_value_t = 2.0, value_parser = positive)]
+    max_error: f64,
+    /// Primary rays for each pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_RAYS_PER_PIXEL)))]
+    rpp: Option<u32>,
+    /// Seed of the random numbers; frame n has the seed plus n
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// Where to render; auto: on a hardware GPU if there is one
+    #[arg(long, value_parser = choice::<BackendChoice>())]
+    backend: Option<BackendChoice>,
+    #[arg(long, value_parser = choice::<Estimator>())]
+    estimator: Option<Estimator>,
+    #[arg(long, value_parser = choice::<SamplerKind>())]
+    sampler: Option<SamplerKind>,
+    #[arg(long, value_parser = choice::<Composite>())]
+    composite: Option<Composite>,
+    /// Surface interactions before the light; 1 is direct light only
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_BOUNCES)))]
+    max_bounces: Option<u32>,
+    /// Bits a channel of PNG frames [default: 16 for 16-bit frames, else 8]
+    #[arg(long, value_parser = PossibleValuesParser::new(["8", "16"]).map(png_bits))]
+    png_bits: Option<PngBits>,
+    /// Write times and counts as JSON
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
+    /// CPU threads [default: all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+impl Arguments {
+    fn overrides(&self) -> Overrides {
+        Overrides {
+            rays_per_pixel: self.rpp,
+            max_bounces: self.max_bounces,
+            seed: self.seed,
+            estimator: self.estimator,
+            sampler: self.sampler,
+            composite: self.composite,
+            backend: self.backend,
+        }
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(threads))
+            .build_global()?;
+    }
+    match &arguments.check {
+        Some(points) => check::run(arguments, points.as_deref()),
+        None => job::run(arguments),
+    }
+}
+
+fn frame_range(text: &str) -> Result<(u32, u32), &'static str> {
+    let ends = text.split_once("..");
+    match ends.and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?))) {
+        Some((from, to)) if from < to => Ok((from, to)),
+        _ => Err("expected FROM..TO, two whole numbers, the first below the second"),
+    }
+}
+
+fn positive(text: &str) -> Result<f64, &'static str> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x <= 1e6 => Ok(x),
+        _ => Err("expected a number above 0"),
+    }
+}
+
+fn focus_pull(text: &str) -> Result<(f64, f64), &'static str> {
+    let ends = text.split_once("..");
+    let metres = |text: &str| text.parse::<f64>().ok().filter(|x| *x > 0.0);
+    match ends.and_then(|(from, to)| Some((metres(from)?, metres(to)?))) {
+        Some(ends) => Ok(ends),
+        None => Err("expected FROM..TO, two distances above 0 in metres, such as 0.4..2.5"),
+    }
+}

@@ -1,0 +1,141 @@
+//! What a sequence is made of, read and checked before the first frame is rendered.
+
+use std::path::Path;
+
+use super::Arguments;
+use crate::cli::{Failure, say};
+use crate::scene::trajectory::{
+    FrameName, FrameView, Intrinsics, Trajectory, Views, read_intrinsics,
+};
+use crate::scene::{self, Given, Object, Photo, Scene};
+use crate::video::FrameSource;
+
+/// Frames a second that stand for an unknown rate, where nothing depends on it but which frame follows which.
+const ANY_RATE: f64 = 25.0;
+
+pub(super) struct Files {
+    pub trajectory: Trajectory,
+    pub intrinsics: Option<Intrinsics>,
+}
+
+impl Files {
+    pub(super) fn read(arguments: &Arguments) -> Result<Self, Failure> {
+        let path = arguments.intrinsics.as_deref();
+        Ok(Self {
+            trajectory: Trajectory::read(&arguments.trajectory)?,
+            intrinsics: path.map(read_intrinsics).transpose()?,
+        })
+    }
+
+    /// `None`: the scene file's.
+    pub(super) fn intrinsics_of(&self, view: &FrameView) -> Option<Intrinsics> {
+        self.intrinsics.or(view.intrinsics)
+    }
+
+    /// The scene with a frame for its photograph.
+    pub(super) fn scene(
+        &self,
+        arguments: &Arguments,
+        view: &FrameView,
+        photo: Option<Photo>,
+    ) -> Result<Scene, Failure> {
+        let given = Given {
+            photo,
+            intrinsics: self.intrinsics_of(view),
+        };
+        let mut scene = scene::load_with(&arguments.scene, given)?;
+        scene.settings.apply(&arguments.overrides());
+        for warning in &scene.warnings {
+            say("warning", warning);
+        }
+        Ok(scene)
+    }
+}
+
+/// Frames a second: of the command line, the trajectory or the stream.
+pub(super) fn known_rate(
+    arguments: &Arguments,
+    trajectory: &Trajectory,
+    source: Option<&FrameSource>,
+) -> Option<f64> {
+    let of_stream = || source?.header()?.frames_per_second();
+    arguments
+        .fps
+        .or(trajectory.frames_per_second)
+        .or_else(of_stream)
+}
+
+pub(super) fn views<'a>(
+    trajectory: &'a Trajectory,
+    rate: Option<f64>,
+    is_stream: bool,
+) -> Result<Views<'a>, Failure> {
+    Ok(Views::new(
+        trajectory,
+        Some(rate.unwrap_or(ANY_RATE)),
+        is_stream,
+    )?)
+}
+
+/// The scene depends on time, so that the rate has to be known.
+pub(super) fn check_rate(
+    scene: &Scene,
+    rate: Option<f64>,
+    views_have_times: bool,
+) -> Result<(), Failure> {
+    let timed = scene.shutter.is_some() || scene.objects.iter().any(Object::is_animated);
+    if timed && rate.is_none() && !views_have_times {
+        return Err(Failure(
+            "the scene has [shutter] or moving objects, but nothing tells the frames' times; expected a frame rate; give --fps".to_owned(),
+        ));
+    }
+    Ok(())
+}
+
+/// All numbers of the range are there, and each has its entry, as far as can be known before the frames are read.
+pub(super) fn check_frames(
+    arguments: &Arguments,
+    source: &FrameSource,
+    views: &Views<'_>,
+) -> Result<(), Failure> {
+    let Some(names) = source.names() else {
+        return Ok(());
+    };
+    let frames = arguments.frames.as_deref().unwrap_or(Path::new("-"));
+    let wanted: Vec<&FrameName> = names
+        .iter()
+        .filter(|name| in_range(arguments, name))
+        .collect();
+    let (Some(first), Some(last)) = (wanted.first(), wanted.last()) else {
+        return Err(Failure(format!(
+            "{}: it holds no frame of the range; expected frames numbered {} to {}; correct --range",
+            frames.display(),
+            names.first().map_or(0, |name| name.number),
+            names.last().map_or(0, |name| name.number)
+        )));
+    };
+    if !arguments.allow_gaps {
+        let (from, to) = arguments.range.unwrap_or((first.number, last.number + 1));
+        let mut numbers = wanted.iter().map(|name| name.number).peekable();
+        for number in from..to {
+            if numbers.next_if_eq(&number).is_none() {
+                return Err(Failure(format!(
+                    "{}: frame {number} is missing; expected all frames from {from} to {}; add it, or say --allow-gaps",
+                    frames.display(),
+                    to - 1
+                )));
+            }
+        }
+    }
+    for name in wanted {
+        views.of(name)?;
+    }
+    Ok(())
+}
+
+pub(super) fn in_range(arguments: &Arguments, name: &FrameName) -> bool {
+    match arguments.range {
+        Some((from, to)) => (from..to).contains(&name.number),
+        None => true,
+    }
+}

@@ -1,0 +1,81 @@
+//! How the objects moved in the picture since the frame before.
+
+use glam::{DMat4, DVec3};
+use rayon::prelude::*;
+
+use super::Renderer;
+use crate::accel::Ray;
+use crate::camera::lens::{camera_ray, project};
+use crate::packed::{Frame, NONE};
+use crate::scene::{Camera, Object, Side};
+use crate::stages::{ObjectBlur, PictureMotion};
+
+/// The frame before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PreviousView {
+    pub world_from_camera: DMat4,
+    pub time_secs: f64,
+}
+
+impl Renderer {
+    /// The motion of every virtual object's centre from the frame before to this one (Fischer and Bartz 2006, equation 11), and which object
+    /// each pixel shows. The centre is that of the box around the object's vertices.
+    pub fn picture_motion(&self, previous: &PreviousView) -> PictureMotion {
+        let before = Camera {
+            world_from_camera: previous.world_from_camera,
+            ..self.scene.camera.clone()
+        };
+        let objects = self.scene.objects.iter().enumerate();
+        let blurs = objects
+            .filter(|(_, object)| object.side == Side::Virtual)
+            .filter_map(|(index, object)| {
+                let (now, then) = self.centres(object, &before, previous.time_secs)?;
+                let blur = now.truncate() - then.truncate();
+                Some(ObjectBlur {
+                    object: index as u32,
+                    blur_px: blur.as_vec2().to_array(),
+                    depth_m: now.z,
+                })
+            })
+            .collect();
+        PictureMotion {
+            objects: self.objects_of_pixels(),
+            blurs,
+        }
+    }
+
+    /// Pixel and depth of an object's centre, now and in the frame before.
+    fn centres(&self, object: &Object, before: &Camera, time_secs: f64) -> Option<(DVec3, DVec3)> {
+        let now = object.centre_at(self.time_secs)?;
+        let then = object.centre_at(time_secs)?;
+        Some((project(&self.scene.camera, now)?, project(before, then)?))
+    }
+
+    fn objects_of_pixels(&self) -> Vec<u32> {
+        let packed = &self.packed;
+        let pinhole = Frame {
+            aperture_radius: 0.0,
+            ..packed.frame
+        };
+        (self.film.pixels.par_iter().enumerate())
+            .map(|(pixel, sums)| {
+                if sums.m == 0 {
+                    return NONE;
+                }
+                let (x, y) = (pixel as u32 % pinhole.width, pixel as u32 / pinhole.width);
+                let ray = camera_ray(&pinhole, x as f32 + 0.5, y as f32 + 0.5, 0.5, 0.5);
+                let hit = packed.virtual_bvh.closest(&Ray {
+                    origin: ray.origin,
+                    direction: ray.direction,
+                    t_min: 0.0,
+                    t_max: f32::INFINITY,
+                    skip: NONE,
+                });
+                match hit.triangle {
+                    NONE => NONE,
+                    triangle => packed.triangles[triangle as usize].object,
+                }
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,277 @@
+//! Camera poses of a video, from files of several programs.
+//!
+//! Read by content: a scene-like TOML file or JSON of this program, `transforms.json` of nerfstudio, COLMAP's text model, TUM trajectories. Poses
+//! become world-from-camera in metres, the camera looking along its -Z with +Y up, whatever the file's own axes.
+
+mod colmap;
+mod json;
+mod opencv;
+mod path;
+mod resolve;
+#[cfg(test)]
+mod tests;
+mod toml;
+mod tum;
+
+pub use opencv::read_intrinsics;
+pub use path::CameraPath;
+pub use resolve::{FrameName, FrameView, Views, trailing_number};
+
+use std::path::{Path, PathBuf};
+
+use glam::{DMat3, DMat4, DQuat, DVec3};
+
+use super::pose::rigid;
+use super::{Camera, SceneError};
+use crate::camera::lens::check_distortion;
+
+/// Why a trajectory was refused. Displays as one line: "problem; expected ...; how to mend", with the file before it.
+#[derive(Debug, thiserror::Error)]
+pub enum TrajectoryError {
+    /// In TOML: file, line and column.
+    #[error(transparent)]
+    Toml(#[from] SceneError),
+    #[error("{}:{line}: {message}", path.display())]
+    Line {
+        path: PathBuf,
+        /// From 1.
+        line: usize,
+        message: String,
+    },
+    #[error("{}: {message}", path.display())]
+    File { path: PathBuf, message: String },
+}
+
+pub(super) type Result<T> = std::result::Result<T, TrajectoryError>;
+
+/// Pinhole intrinsics with OpenCV distortion, as [`super::Camera`] has them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intrinsics {
+    /// Width and height of the pictures, where the file says.
+    pub size: Option<(u32, u32)>,
+    /// Pixels.
+    pub fx: f64,
+    pub fy: f64,
+    /// Pixels, corner origin.
+    pub cx: f64,
+    pub cy: f64,
+    /// OpenCV k1 k2 p1 p2 k3.
+    pub distortion: [f64; 5],
+}
+
+impl Intrinsics {
+    /// The camera that takes pictures of this size.
+    ///
+    /// # Errors
+    /// The intrinsics are of another size, or their distortion does not reach every pixel: the problem alone, without what was expected.
+    pub fn camera(
+        &self,
+        (width, height): (u32, u32),
+        world_from_camera: DMat4,
+    ) -> std::result::Result<Camera, String> {
+        if let Some((own_width, own_height)) = self.size
+            && (own_width, own_height) != (width, height)
+        {
+            return Err(format!(
+                "the intrinsics are those of {own_width} x {own_height} pixels where the frames have {width} x {height}"
+            ));
+        }
+        let camera = Camera {
+            width,
+            height,
+            fx: self.fx,
+            fy: self.fy,
+            cx: self.cx,
+            cy: self.cy,
+            distortion: self.distortion,
+            world_from_camera,
+        };
+        check_distortion(&camera).map_err(|problem| problem.to_string())?;
+        Ok(camera)
+    }
+}
+
+/// How an entry says which picture it belongs to.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum EntryKey {
+    /// The number at the end of the picture's name; its place from 0 in a stream.
+    Number(u32),
+    /// File name without folders.
+    Name(String),
+    /// Seconds; the picture whose name is a time stamp, or else by order.
+    Time,
+}
+
+/// One pose of the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    pub key: EntryKey,
+    /// "line 7" or "frames[3]": for messages.
+    pub place: String,
+    /// `None`: from the frame number and the frame rate.
+    pub time_secs: Option<f64>,
+    /// `None`: given as null. The frame passes through unchanged.
+    pub world_from_camera: Option<DMat4>,
+    pub intrinsics: Option<Intrinsics>,
+    /// Along the view axis, if the file pulls the focus.
+    pub focus_distance_m: Option<f64>,
+}
+
+/// A point of the world and where it was seen, for checking poses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownPoint {
+    pub key: EntryKey,
+    /// "line 7": for messages.
+    pub place: String,
+    pub world: DVec3,
+    /// Photograph pixels, corner origin; `None`: only the program's own projection is checked.
+    pub seen: Option<[f64; 2]>,
+}
+
+/// Poses as a file gives them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory {
+    pub path: PathBuf,
+    /// Files that were read.
+    pub files: Vec<PathBuf>,
+    pub frames_per_second: Option<f64>,
+    /// Of all entries that bring none of their own.
+    pub intrinsics: Option<Intrinsics>,
+    pub entries: Vec<Entry>,
+    /// COLMAP's own observations.
+    pub known_points: Vec<KnownPoint>,
+}
+
+impl Trajectory {
+    /// Reads a file, or a COLMAP folder with `cameras.txt` and `images.txt`.
+    ///
+    /// # Errors
+    /// What cannot be used, in one line: a NaN, a pose that is not rigid, an entry without its pose, two entries for one picture.
+    pub fn read(path: &Path) -> Result<Self> {
+        if path.is_dir() {
+            return colmap::read(path, &path.join("images.txt"))?.checked();
+        }
+        let text = read_text(path)?;
+        let extension = path.extension().map(|e| e.to_ascii_lowercase());
+        let name = path.file_name().unwrap_or_default();
+        if name == "images.txt" {
+            colmap::read(path.parent().unwrap_or(Path::new("")), path)
+        } else if extension.is_some_and(|e| e == "toml") {
+            toml::read(path, text)
+        } else if text.trim_start().starts_with('{') {
+            json::read(path, &text)
+        } else {
+            tum::read(path, &text)
+        }
+        .and_then(Self::checked)
+    }
+
+    fn checked(self) -> Result<Self> {
+        if self.entries.is_empty() {
+            return Err(file_error(
+                &self.path,
+                "it holds no pose; expected one for each frame; add them",
+            ));
+        }
+        if self
+            .entries
+            .iter()
+            .all(|entry| entry.world_from_camera.is_none())
+        {
+            return Err(file_error(
+                &self.path,
+                "every pose is null; expected at least one; track the camera, or copy the frames",
+            ));
+        }
+        Ok(self)
+    }
+}
+
+fn read_text(path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).map_err(|error| {
+        file_error(
+            path,
+            format!("it cannot be read ({error}); expected a file of poses; correct the path"),
+        )
+    })?;
+    String::from_utf8(bytes).map_err(|_| {
+        file_error(
+            path,
+            "it is no UTF-8 text; expected TOML, JSON, COLMAP or TUM text; export it as text",
+        )
+    })
+}
+
+fn file_error(path: &Path, message: impl Into<String>) -> TrajectoryError {
+    TrajectoryError::File {
+        path: path.into(),
+        message: message.into(),
+    }
+}
+
+fn line_error(path: &Path, line: usize, message: impl Into<String>) -> TrajectoryError {
+    TrajectoryError::Line {
+        path: path.into(),
+        line,
+        message: message.into(),
+    }
+}
+
+/// A finite number of at most 1e15, or why not.
+fn finite(x: f64, what: &str) -> std::result::Result<f64, String> {
+    if x.abs() <= super::reader::MAX_MAGNITUDE {
+        return Ok(x);
+    }
+    Err(format!(
+        "{what} is {x}; expected a finite number; correct it, or give the pose as null so that its frame passes through"
+    ))
+}
+
+/// The numbers of a line of text, NaN and the like refused.
+fn numbers<const N: usize>(words: &[&str], what: &str) -> std::result::Result<[f64; N], String> {
+    let mut values = [0.0; N];
+    if words.len() < N {
+        return Err(format!(
+            "{} numbers where {what} need {N}; expected {N}; complete the line",
+            words.len()
+        ));
+    }
+    for (value, word) in values.iter_mut().zip(words) {
+        let parsed = word
+            .parse::<f64>()
+            .map_err(|_| format!("\"{word}\" is no number; expected {what}; correct the line"))?;
+        *value = finite(parsed, what)?;
+    }
+    Ok(values)
+}
+
+/// World-from-camera of rows, made exactly rigid.
+fn pose_of_rows(rows: [[f64; 4]; 4]) -> std::result::Result<DMat4, String> {
+    for x in rows.as_flattened() {
+        finite(*x, "an element of the pose")?;
+    }
+    rigid(&rows).map_err(|problem| {
+        format!(
+            "the pose is not rigid: {problem}; expected a rotation and a translation, as 4 rows, the camera looking along its -Z; correct the matrix"
+        )
+    })
+}
+
+/// World-from-camera of OpenCV axes (y down, looking along +Z) turned to ours.
+fn from_opencv_axes(world_from_camera: DMat4) -> DMat4 {
+    world_from_camera * DMat4::from_scale(DVec3::new(1.0, -1.0, -1.0))
+}
+
+/// A unit quaternion x, y, z, w of nearly unit length, and a position.
+fn pose_of_quaternion(quaternion: DQuat, position: DVec3) -> std::result::Result<DMat4, String> {
+    let length = quaternion.length();
+    if (length - 1.0).abs() > 1e-2 {
+        return Err(format!(
+            "the quaternion has length {length:.6}; expected a unit quaternion; divide it by its length"
+        ));
+    }
+    Ok(DMat4::from_mat3_translation(
+        DMat3::from_quat(quaternion.normalize()),
+        position,
+    ))
+}

@@ -1,0 +1,57 @@
+//! TUM RGB-D trajectories: `timestamp tx ty tz qx qy qz qw` a line, world-from-camera in OpenCV's axes.
+
+use std::path::Path;
+
+use glam::{DQuat, DVec3};
+
+use super::{
+    Entry, EntryKey, Result, Trajectory, from_opencv_axes, line_error, numbers, pose_of_quaternion,
+};
+
+pub(super) fn read(path: &Path, text: &str) -> Result<Trajectory> {
+    let mut entries: Vec<Entry> = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let number = index + 1;
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let entry =
+            read_line(&words, number).map_err(|problem| line_error(path, number, problem))?;
+        if entries
+            .last()
+            .is_some_and(|before| before.time_secs >= entry.time_secs)
+        {
+            return Err(line_error(
+                path,
+                number,
+                "its time stamp is not after the line before; expected rising time stamps; sort the lines",
+            ));
+        }
+        entries.push(entry);
+    }
+    Ok(Trajectory {
+        path: path.into(),
+        files: vec![path.into()],
+        frames_per_second: None,
+        intrinsics: None,
+        entries,
+        known_points: Vec::new(),
+    })
+}
+
+fn read_line(words: &[&str], number: usize) -> std::result::Result<Entry, String> {
+    let form = "timestamp tx ty tz qx qy qz qw";
+    let [time, x, y, z, qx, qy, qz, qw] = numbers::<8>(words, form)?;
+    let quaternion = DQuat::from_xyzw(qx, qy, qz, qw);
+    let pose = pose_of_quaternion(quaternion, DVec3::new(x, y, z))?;
+    Ok(Entry {
+        key: EntryKey::Time,
+        place: format!("line {number}"),
+        time_secs: Some(time),
+        world_from_camera: Some(from_opencv_axes(pose)),
+        intrinsics: None,
+        focus_distance_m: None,
+    })
+}
