@@ -99,6 +99,7 @@ pub fn finish(
                 film,
                 &picture,
                 scene.photo.as_ref(),
+                ratio.as_deref(),
                 scene.settings.sampler,
                 smallest_sigma(settings),
             )),

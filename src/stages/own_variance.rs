@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::film::{Film, Picture, variance};
+use crate::film::{Film, Picture, QUOTIENT_EPSILON, variance};
 use crate::scene::{Photo, SamplerKind};
 
 /// Half of the window.
@@ -21,16 +21,21 @@ const SPREAD: f32 = 50.0;
 /// A variance below this share of the camera's is not worth a closer look.
 const NEGLIGIBLE: f32 = 0.02;
 
-/// Variance of `picture`, linear, that stems from the rendering; 0 where a single sample says nothing about it. `camera_sigma_dn` is the
-/// camera's smallest sigma: what is far below it is only roughly estimated.
+/// Variance of `picture`, linear, that stems from the rendering; 0 where a single sample says nothing about it. `ratio` is what the quotient
+/// composite multiplied the photograph with, None for the additive one. `camera_sigma_dn` is the camera's smallest sigma: what is far below it is
+/// only roughly estimated.
 pub fn own_variance(
     film: &Film,
     picture: &Picture,
     photo: Option<&Photo>,
+    ratio: Option<&[[f32; 3]]>,
     sampler: SamplerKind,
     camera_sigma_dn: f32,
 ) -> Vec<[f32; 3]> {
     let mut plane = variance(film, photo);
+    if let (Some(_), Some(photo)) = (ratio, photo) {
+        scale_to_quotient(&mut plane, film, photo);
+    }
     let (width, height) = (film.width as usize, film.height as usize);
     // By row, the columns that deserve a closer look.
     let ranges: Vec<Range<usize>> = plane
@@ -52,7 +57,7 @@ pub fn own_variance(
             range
         })
         .collect();
-    let estimate = without_photo(film, picture, photo, &|y| {
+    let estimate = without_photo(film, picture, photo, ratio, &|y| {
         let rows = &ranges[y.saturating_sub(REACH)..(y + REACH + 1).min(height)];
         let start = rows.iter().map(|range| range.start).min().unwrap_or(0);
         let end = rows.iter().map(|range| range.end).max().unwrap_or(0);
@@ -75,6 +80,23 @@ pub fn own_variance(
             }
         });
     plane
+}
+
+/// The quotient composite multiplies what the difference brings by the photograph over the real radiance.
+fn scale_to_quotient(plane: &mut [[f32; 3]], film: &Film, photo: &Photo) {
+    for ((variance, sums), ic) in plane.iter_mut().zip(&film.pixels).zip(&photo.linear) {
+        if sums.n_real == 0 || sums.m == sums.n {
+            continue;
+        }
+        let share = 1.0 - sums.m as f32 / sums.n as f32;
+        let real = (sums.r_ir.value() / f64::from(sums.n_real)).as_vec3();
+        for c in 0..3 {
+            let gain = share * ic[c] / real[c].max(QUOTIENT_EPSILON as f32);
+            // What virtual surfaces bring is not multiplied.
+            let gain = if sums.m > 0 { gain.max(1.0) } else { gain };
+            variance[c] *= gain * gain;
+        }
+    }
 }
 
 /// Far below the camera's own variance at these linear values. The curve's slope is bounded from below by its straight end and by twice
@@ -103,6 +125,7 @@ fn without_photo(
     film: &Film,
     picture: &Picture,
     photo: Option<&Photo>,
+    ratio: Option<&[[f32; 3]]>,
     wanted: &(dyn Fn(usize) -> Range<usize> + Sync),
 ) -> Vec<[f32; 3]> {
     let (width, height) = (film.width as usize, film.height as usize);
@@ -123,8 +146,9 @@ fn without_photo(
                 }
             });
             let own = photo.linear[y * width + x];
-            for ((value, own), mean) in value.iter_mut().zip(own).zip(mean) {
-                *value -= share * (own - mean / COUNT);
+            let ratio = ratio.map_or([1.0; 3], |ratio| ratio[y * width + x]);
+            for c in 0..3 {
+                value[c] -= share * ratio[c] * (own[c] - mean[c] / COUNT);
             }
         }
     });

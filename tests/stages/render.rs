@@ -110,6 +110,45 @@ fn the_noise_level_is_one_across_a_soft_edge() {
     }
 }
 
+/// A shadow over the whole of a noisy grey photograph, from a lid behind the camera; the quotient composite does not depend on the exposure, and
+/// neither may its noise.
+#[test]
+fn the_quotients_noise_does_not_depend_on_the_exposure() {
+    let folder = Folder::new();
+    card(&folder, "");
+    let level = |exposure_ev: f64, noise: &str| {
+        let scene = format!(
+            "[photo]\nimage = \"photo.png\"\nexposure_ev = {exposure_ev:?}\n[camera]\nvertical_fov_deg = 30\nposition = [0, 1, 0]\n\
+             look_at = [0, 0, 0]\nup = [0, 0, -1]\n[environment]\nradiance = [0.5, 0.5, 0.5]\n[[real]]\nshape = \"quad\"\ncorner = [-5, 0, 5]\n\
+             edge_u = [10, 0, 0]\nedge_v = [0, 0, -10]\nmaterial = {{ base_color = [0.5, 0.5, 0.5], specular = 0.0 }}\n[[virtual]]\nshape = \"quad\"\n\
+             corner = [-3, 1.5, 3]\nedge_u = [6, 0, 0]\nedge_v = [0, 0, -6]\nmaterial = {{ base_color = [0, 0, 0], specular = 0.0 }}\n[render]\n\
+             backend = \"cpu\"\nrays_per_pixel = 64\nmax_bounces = 1\ncomposite = \"quotient\"\n{noise}"
+        );
+        folder.write("scene.toml", &scene);
+        folder.done(&["render", "scene.toml", "-o", "out.png"]);
+        let picture = open(&folder.path("out.png"));
+        // Of neighbours: the shadow is smooth.
+        let differences: Vec<f64> = (0..HEIGHT)
+            .flat_map(|y| (1..WIDTH).map(move |x| (x, y)))
+            .map(|(x, y)| {
+                f64::from(picture.get_pixel(x, y).0[1])
+                    - f64::from(picture.get_pixel(x - 1, y).0[1])
+            })
+            .collect();
+        (spread(&differences).powi(2) / 2.0 - 1.0 / 12.0)
+            .max(0.0)
+            .sqrt()
+    };
+    let noise = "[noise]\nprofile = \"noise.toml\"\n";
+    let levels = [-1.0, -3.0].map(|exposure_ev| level(exposure_ev, noise));
+    let without = level(-1.0, "");
+    eprintln!("{levels:.2?} DN at two exposures, {without:.2} DN without the stage");
+    for level in levels {
+        assert!((level / SIGMA - 1.0).abs() < 0.05, "{level:.3} DN");
+    }
+    assert!(without < 0.85 * SIGMA, "control: {without:.3} DN");
+}
+
 #[test]
 fn antialiasing_works_on_one_ray_and_is_off_on_many() {
     let folder = Folder::new();

@@ -100,7 +100,7 @@ pub(super) fn run(arguments: &Arguments, points: Option<&Path>) -> Result<Outcom
         entry.own = entry.own.max(own_error(&camera, lens, point.world, pixel));
     }
     let text = table(&errors, used, without_pose, behind);
-    print(&text);
+    print(&text)?;
     let worst = errors
         .values()
         .flat_map(|e| e.seen.iter().copied())

@@ -373,7 +373,7 @@ impl Sequence<'_> {
             // Standard output is the film. Without a stderr there is nobody to tell.
             let _ = std::io::stderr().write_all(text.as_bytes());
         } else {
-            print(&text);
+            print(&text)?;
         }
         if stats.non_finite_samples > 0 {
             say(
