@@ -3,7 +3,9 @@
 mod accumulation;
 mod compare;
 mod composite;
+mod filter;
 mod flip;
+mod scrambles;
 mod sums;
 
 pub use accumulation::{Film, MergeError, PixelCounts, PixelKind};
@@ -11,7 +13,9 @@ pub use compare::{Comparison, SizeMismatch, compare};
 pub use composite::{
     Picture, Planes, QUOTIENT_EPSILON, composite, estimated_error, planes, variance,
 };
+pub use filter::{RealSurface, filter_difference};
 pub use flip::{flip, flip_map};
+pub use scrambles::{Scrambles, stated_share};
 pub use sums::{
     Guide, GuideSums, PixelSums, Sample, Sum3, guide_add, is_unusable, pixel_add, pixel_add_real,
     sum_add, sum3_add, two_sum,

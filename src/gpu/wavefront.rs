@@ -14,7 +14,7 @@ use super::profile::{
 };
 use super::{Composer, Features, GpuDevice, GpuError, SceneBuffers, SceneParts};
 use crate::film::Film;
-use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
+use crate::packed::{PIXEL_EDGE, PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
 use crate::renderer::{Cancel, Pass, RayTotals};
 
 /// Samples of one pixel in a batch at most, so that a batch has pixels enough to sum in parallel.
@@ -109,6 +109,11 @@ impl GpuBackend {
         // Bind groups name the old buffers.
         self.lanes = None;
         Ok(())
+    }
+
+    /// Another seed or number of samples of the same scene, which costs next to nothing.
+    pub fn set_frame(&mut self, scene: &PackedScene) {
+        self.scene.set_frame(&self.gpu, &SceneParts::from(scene));
     }
 
     /// Compiles the kernels for `features` from `composer`'s modules; `scene` is what they read.
@@ -222,7 +227,7 @@ impl GpuBackend {
     ) -> Result<(), GpuError> {
         let (real_pass, work) = match pass {
             Pass::Main { end } => (false, main_work(&scene.pixels, film, end)),
-            Pass::Real { everywhere } => (true, real_work(film, everywhere)),
+            Pass::Real { everywhere } => (true, real_work(&scene.pixels, film, everywhere)),
         };
         if cancel.is_cancelled() {
             return Ok(());
@@ -502,12 +507,14 @@ pub(super) fn main_work(pixels: &[PixelInfo], film: &Film, end: u32) -> Vec<Pixe
 }
 
 /// The real samples that edge pixels lack; `everywhere`: those of all pixels that are not wholly virtual.
-pub(super) fn real_work(film: &Film, everywhere: bool) -> Vec<PixelWork> {
+pub(super) fn real_work(pixels: &[PixelInfo], film: &Film, everywhere: bool) -> Vec<PixelWork> {
     film.pixels
         .iter()
         .enumerate()
         .filter(|&(pixel, sums)| {
-            film.needs_real(pixel) || (everywhere && sums.m < sums.n && sums.n_real < sums.n)
+            let known_edge = pixels[pixel].flags & PIXEL_EDGE != 0;
+            sums.n_real < sums.n
+                && (known_edge || film.needs_real(pixel) || (everywhere && sums.m < sums.n))
         })
         .map(|(pixel, sums)| {
             let first = film.first_index(pixel);

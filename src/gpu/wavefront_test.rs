@@ -321,6 +321,9 @@ fn a_pass_asks_for_what_each_pixel_lacks() {
         [work(0, 10..14), work(1, 13..14), work(2, 13..14)]
     );
     assert_eq!(main_work(&pixels, &film, 13), [work(0, 10..13)]);
-    assert_eq!(real_work(&film, false), [work(1, 10..13)]);
-    assert_eq!(real_work(&film, true), [work(1, 10..13), work(2, 10..13)]);
+    assert_eq!(real_work(&pixels, &film, false), [work(1, 10..13)]);
+    assert_eq!(
+        real_work(&pixels, &film, true),
+        [work(1, 10..13), work(2, 10..13)]
+    );
 }
