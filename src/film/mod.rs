@@ -5,6 +5,7 @@ mod compare;
 mod composite;
 mod filter;
 mod flip;
+mod pools;
 mod scrambles;
 mod sums;
 
@@ -15,7 +16,8 @@ pub use composite::{
 };
 pub use filter::{RealSurface, filter_difference};
 pub use flip::{flip, flip_map};
-pub use scrambles::{Scrambles, stated_share};
+pub use pools::pooled;
+pub use scrambles::Scrambles;
 pub use sums::{
     Guide, GuideSums, PixelSums, Sample, Sum3, guide_add, is_unusable, pixel_add, pixel_add_real,
     sum_add, sum3_add, two_sum,

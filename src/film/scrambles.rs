@@ -11,11 +11,6 @@ use super::composite::{Means, QUOTIENT_EPSILON};
 use super::{Film, GuideSums, PixelSums};
 use crate::scene::{Composite, Photo};
 
-/// Pixels to either side whose spread a pixel's own is moderated with.
-const NEAR: usize = 2;
-/// Degrees of freedom that the neighbours' spread counts as.
-const NEIGHBOURS: f64 = 15.0;
-
 /// What the composite of one channel is made of, scramble by scramble.
 const TERMS: usize = 4;
 
@@ -61,14 +56,6 @@ impl Channel {
 struct Moments {
     channels: [Channel; 3],
     count: u32,
-}
-
-/// Stated variance of the mean of `count` scrambles over the moderated variance of one: 1 / S, times f / (f - 2), which is the variance of
-/// Student's t with f degrees of freedom, so that (estimate - truth) / stated error has variance 1 although the spread itself is an estimate.
-pub fn stated_share(count: u32) -> f64 {
-    let count = f64::from(count.max(1));
-    let freedom = count - 1.0 + NEIGHBOURS;
-    freedom / (freedom - 2.0) / count
 }
 
 /// The sum of scrambles, and their spread in the pixels that something virtual may reach (about 350 bytes each).
@@ -148,69 +135,32 @@ impl Scrambles {
         self.film
     }
 
-    /// Pixel and variance of the composite of one scramble, linear, by channel.
-    pub fn variances_of_one<'a>(
-        &'a self,
-        photo: Option<&'a Photo>,
-    ) -> impl ParallelIterator<Item = (usize, DVec3)> + 'a {
-        self.active
-            .par_iter()
-            .zip(&self.moments)
-            .map(move |(&pixel, moments)| {
-                let pixel = pixel as usize;
-                let ic = photo.map_or([0.0; 3], |photo| photo.linear[pixel]);
-                (pixel, self.variance_of_one(moments, ic))
-            })
+    /// Variance of the composite of one scramble, linear, by channel, as the pixel's own scrambles tell it; `None` where there are no two.
+    ///
+    /// Right on average, but not pixel by pixel: light may be faint in most samples and bright in a few, and where the scrambles met none of
+    /// the few their spread states next to no error. See [`pooled`](super::pooled).
+    pub fn own_variances(&self, photo: Option<&Photo>) -> Vec<Option<DVec3>> {
+        let mut own = vec![None; self.film.pixels.len()];
+        for (&pixel, moments) in self.active.iter().zip(&self.moments) {
+            let pixel = pixel as usize;
+            let ic = photo.map_or([0.0; 3], |photo| photo.linear[pixel]);
+            own[pixel] = (moments.count > 1).then(|| self.variance_of_one(moments, ic));
+        }
+        own
+    }
+
+    /// Scrambles that have samples of this pixel.
+    pub fn count(&self, pixel: usize) -> u32 {
+        (self.active.binary_search(&(pixel as u32))).map_or(0, |slot| self.moments[slot].count)
     }
 
     fn variance_of_one(&self, moments: &Moments, ic: [f32; 3]) -> DVec3 {
-        if moments.count < 2 {
-            return DVec3::ZERO;
-        }
         let ic = Vec3::from(ic).as_dvec3();
         let squares: [f64; 3] = std::array::from_fn(|c| {
             let channel = &moments.channels[c];
             channel.squares(gradient(&channel.mean, self.mode, ic[c]))
         });
         DVec3::from(squares) / f64::from(moments.count - 1)
-    }
-
-    /// Stated variance of the composite of `film`, linear, by channel and pixel; 0 where no two scrambles differ, here and nearby.
-    ///
-    /// A pixel's light may be faint in most samples and bright in a few. Where the scrambles met none of the few, their own spread states next to
-    /// no error. It is moderated by the mean spread of the pixels of the same kind within two pixels (as G. K. Smyth, "Linear models and
-    /// empirical Bayes methods", 2004, does with genes): both count by their degrees of freedom.
-    pub fn stated_variances(&self, photo: Option<&Photo>) -> Vec<[f32; 3]> {
-        let (width, height) = (self.film.width as usize, self.film.height as usize);
-        let mut own = vec![None; self.film.pixels.len()];
-        let of_one: Vec<(usize, DVec3)> = self.variances_of_one(photo).collect();
-        for ((pixel, variance), moments) in of_one.into_iter().zip(&self.moments) {
-            own[pixel] = (moments.count > 1).then_some((variance, moments.count));
-        }
-        let stated = |(pixel, own_here): (usize, &Option<(DVec3, u32)>)| {
-            let Some((variance, count)) = *own_here else {
-                return [0.0; 3];
-            };
-            let kind = self.film.kind(pixel);
-            let (x, y) = (pixel % width, pixel / width);
-            let (mut sum, mut pixels) = (DVec3::ZERO, 0.0);
-            for near_y in y.saturating_sub(NEAR)..(y + NEAR + 1).min(height) {
-                for near_x in x.saturating_sub(NEAR)..(x + NEAR + 1).min(width) {
-                    let near = near_y * width + near_x;
-                    if let Some((variance, _)) = own[near]
-                        && self.film.kind(near) == kind
-                    {
-                        sum += variance;
-                        pixels += 1.0;
-                    }
-                }
-            }
-            let freedom = f64::from(count - 1);
-            let moderated =
-                (variance * freedom + sum / pixels * NEIGHBOURS) / (freedom + NEIGHBOURS);
-            (moderated * stated_share(count)).as_vec3().to_array()
-        };
-        own.par_iter().enumerate().map(stated).collect()
     }
 }
 
@@ -307,8 +257,7 @@ mod tests {
             const RENDERS: u32 = 3000;
             for render in 0..RENDERS {
                 let mean = mean_of(render * 16, 16, mode);
-                let students = 30.0 / 28.0;
-                stated += f64::from(mean.stated_variances(Some(&photo))[0][0]) / students;
+                stated += mean.own_variances(Some(&photo))[0].map_or(0.0, |v| v.x) / 16.0;
                 let channel = &mean.moments[0].channels[0];
                 let weights = gradient(&channel.mean, mode, f64::from(IC));
                 sum_of_parts += (0..TERMS)
@@ -342,8 +291,9 @@ mod tests {
         }
         let anew = mean_of(7, 3, Composite::Additive);
         assert_eq!(sum.film(), anew.film());
-        let stated = |s: &Scrambles| s.stated_variances(None);
+        let stated = |s: &Scrambles| s.own_variances(None);
         assert_eq!(stated(&sum), stated(&anew));
+        assert_eq!(sum.count(0), 3);
         assert_ne!(
             stated(&sum),
             stated(&mean_of(7, 4, Composite::Additive)),
@@ -357,6 +307,6 @@ mod tests {
         for _ in 0..16 {
             sum.add(&scramble(3));
         }
-        assert_eq!(sum.stated_variances(Some(&photo())), [[0.0; 3]]);
+        assert_eq!(sum.own_variances(Some(&photo())), [Some(DVec3::ZERO)]);
     }
 }

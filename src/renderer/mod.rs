@@ -21,6 +21,7 @@ mod adaptive;
 mod control;
 mod goal;
 mod photo_albedo;
+mod series;
 mod skips;
 mod stats;
 mod tiles;

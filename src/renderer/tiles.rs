@@ -8,7 +8,7 @@ const SIDE: usize = 16;
 const LEAST_EXPONENT: f64 = 1.0;
 const GREATEST_EXPONENT: f64 = 2.0;
 /// Room for what a trial of a few scrambles underrates.
-const MARGIN: f64 = 1.1;
+pub const MARGIN: f64 = 1.1;
 
 /// Squares of [`SIDE`] pixels that cover the picture.
 pub struct Tiles {
@@ -30,6 +30,11 @@ impl Tiles {
         self.across * self.height.div_ceil(SIDE)
     }
 
+    /// Of the picture, pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
     pub fn of_pixel(&self, pixel: usize) -> usize {
         let (x, y) = (pixel % self.width, pixel / self.width);
         y / SIDE * self.across + x / SIDE
@@ -45,6 +50,19 @@ impl Tiles {
         sums.iter().zip(pixels).map(|(sum, n)| sum / n).collect()
     }
 
+    /// [`Tiles::means`], each raised by its own standard error: a tile whose mean hangs on a few pixels may well have a higher one.
+    pub fn cautious_means(&self, values: &[(usize, f64)]) -> Vec<f64> {
+        let means = self.means(values);
+        let squared: Vec<_> = values
+            .iter()
+            .map(|&(p, value)| (p, value * value))
+            .collect();
+        let squares = self.means(&squared);
+        let each = means.iter().zip(squares).zip(self.pixels());
+        each.map(|((mean, square), n)| mean + ((square - mean * mean).max(0.0) / n).sqrt())
+            .collect()
+    }
+
     /// Pixels of each tile: those at the right and lower border may have fewer.
     fn pixels(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.count()).map(|tile| {
@@ -52,6 +70,16 @@ impl Tiles {
             let wide = side(tile % self.across, self.width);
             (wide * side(tile / self.across, self.height)) as f64
         })
+    }
+
+    /// The most samples that a pixel of each tile takes in one pass.
+    pub fn greatest_factors(&self, pixels: &[PixelInfo]) -> Vec<u32> {
+        let mut greatest = vec![0; self.count()];
+        for (pixel, info) in pixels.iter().enumerate() {
+            let greatest: &mut u32 = &mut greatest[self.of_pixel(pixel)];
+            *greatest = info.sample_factor.max(*greatest);
+        }
+        greatest
     }
 
     /// The tiles that have a pixel within reach of something virtual.
@@ -104,6 +132,10 @@ mod tests {
         values.push((0, 256.0));
         let means = tiles.means(&values);
         assert_eq!((means[0], means[1], means[5]), (1.0, 0.0, 3.0));
+        // One pixel of 256 carries the first tile's mean: variance 255 of a value, about 1 of the mean.
+        let cautious = tiles.cautious_means(&values);
+        assert!((cautious[0] - 1.0 - f64::sqrt(255.0 / 256.0)).abs() < 1e-12);
+        assert_eq!((cautious[1], cautious[5]), (0.0, 3.0));
     }
 
     /// The squared error is c / samples^k: the gain found brings it to the goal, less the margin.
