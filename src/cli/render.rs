@@ -16,7 +16,8 @@ use crate::renderer::{
     Budget, CameraNoise, ErrorGoal, Renderer, RendererOptions, SCRAMBLES, Skip, Stats, Without,
 };
 use crate::scene::{
-    self, BackendChoice, Choice, Composite, Estimator, Overrides, SamplerKind, Settings,
+    self, BackendChoice, Choice, Composite, Estimator, NoiseFit, NoiseProfile, Overrides,
+    SamplerKind, Settings,
 };
 use crate::stages::finish;
 
@@ -64,11 +65,12 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "E", value_parser = above_zero, conflicts_with = "range")]
     target_error: Option<f64>,
     /// camera-noise: render until the variance of the composite is no more than that of the camera's noise
-    #[arg(long, value_name = "WHEN", value_parser = ["camera-noise"], requires = "camera_noise", conflicts_with = "range")]
+    #[arg(long, value_name = "WHEN", value_parser = ["camera-noise"], conflicts_with = "range")]
     stop_at: Option<String>,
-    /// The camera's noise, sigma^2 = A y + B in 8-bit code values y of the encoded picture
-    #[arg(long, value_name = "A,B", value_parser = camera_noise, requires = "stop_at")]
-    camera_noise: Option<CameraNoise>,
+    /// The camera's noise: a file of `mixray noise calibrate`, or sigma^2 = A y + B in 8-bit code values y of the encoded picture
+    /// [default: the profile of the scene's [noise]]
+    #[arg(long, value_name = "NOISE.toml|A,B", requires = "stop_at")]
+    camera_noise: Option<String>,
     /// Smooth what virtual objects change on diffuse real surfaces, for previews of a few rays per pixel: biased
     #[arg(long, conflicts_with = "range")]
     filter: bool,
@@ -109,6 +111,8 @@ pub(super) struct Job {
     range: Option<(u32, u32)>,
     without: Without,
     goal: Option<ErrorGoal>,
+    /// The goal is the camera's noise, which the scene tells.
+    noise_of_scene: bool,
     filter: bool,
 }
 
@@ -129,6 +133,7 @@ impl Arguments {
         }
         let goal = self.goal()?;
         Ok(Job {
+            noise_of_scene: self.stop_at.is_some() && self.camera_noise.is_none(),
             goal,
             filter: self.filter,
             scene: self.scene,
@@ -155,7 +160,7 @@ impl Arguments {
 
 impl Arguments {
     fn goal(&self) -> Result<Option<ErrorGoal>, Failure> {
-        if self.target_error.is_none() && self.camera_noise.is_none() {
+        if self.target_error.is_none() && self.stop_at.is_none() {
             return Ok(None);
         }
         if self.rpp.is_some_and(|rpp| rpp < SCRAMBLES) {
@@ -165,7 +170,7 @@ impl Arguments {
         }
         Ok(Some(ErrorGoal {
             standard_error: self.target_error,
-            noise: self.camera_noise,
+            noise: self.camera_noise.as_deref().map(camera_noise).transpose()?,
             max_rays_per_pixel: self.rpp.unwrap_or(ErrorGoal::DEFAULT_MAX_RAYS_PER_PIXEL),
         }))
     }
@@ -180,6 +185,18 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let start = Instant::now();
     let mut scene = scene::load(&job.scene)?;
     scene.settings.apply(&job.overrides);
+    let mut goal = job.goal;
+    if let Some(goal) = goal.as_mut().filter(|_| job.noise_of_scene) {
+        let Some(noise) = &scene.stages.noise else {
+            return Err(Failure(format!(
+                "{} has no [noise]: --stop-at camera-noise wants --camera-noise NOISE.toml or A,B",
+                job.scene.display()
+            )));
+        };
+        goal.noise = Some(CameraNoise {
+            fit: noise.profile.fit,
+        });
+    }
     for warning in &scene.warnings {
         say("warning", warning);
     }
@@ -205,14 +222,14 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let mut renderer = Renderer::new(scene, options)?;
     let interrupted = interrupt::watch()?;
     let (first, end) = (job.range).unwrap_or((0, renderer.scene().settings.rays_per_pixel));
-    let unit = if job.goal.is_some() {
+    let unit = if goal.is_some() {
         "scrambles"
     } else {
         "rays per pixel"
     };
     let bar = progress::Bar::new(end - first, unit);
     let cancelled = || interrupted.is_set();
-    let result = match &job.goal {
+    let result = match &goal {
         Some(goal) => renderer.render_to_error(goal, &cancelled, &mut |p| bar.show(&p)),
         None => renderer.advance(Budget::Complete, &cancelled, &mut |p| bar.show(&p)),
     };
@@ -299,18 +316,24 @@ pub(super) fn above_zero(text: &str) -> Result<f64, &'static str> {
     }
 }
 
-/// "0.01,0.2".
-fn camera_noise(text: &str) -> Result<CameraNoise, &'static str> {
-    let parse = |part: &str| {
-        part.trim()
-            .parse()
-            .ok()
-            .filter(|x: &f64| *x >= 0.0 && x.is_finite())
-    };
-    let parts: Option<Vec<f64>> = text.split(',').map(parse).collect();
-    match parts.as_deref() {
-        Some(&[slope, offset]) if slope + offset > 0.0 => Ok(CameraNoise { slope, offset }),
-        _ => Err("expected A,B, two numbers of 0 or more, not both 0"),
+/// "0.01,0.2", or the name of a file.
+fn camera_noise(text: &str) -> Result<CameraNoise, Failure> {
+    let parse = |part: &str| part.trim().parse::<f64>().ok();
+    let numbers: Option<Vec<f64>> = text.split(',').map(parse).collect();
+    match numbers.as_deref() {
+        Some(&[a, b]) if a >= 0.0 && b >= 0.0 && a + b > 0.0 && (a + b).is_finite() => {
+            Ok(CameraNoise {
+                fit: [NoiseFit { a, b }; 3],
+            })
+        }
+        Some(_) => Err(Failure(format!(
+            "--camera-noise {text}: expected two numbers of 0 or more, not both 0, such as 0.02,0.5"
+        ))),
+        None => {
+            let profile = NoiseProfile::read(Path::new(text))
+                .map_err(|problem| Failure(format!("{text}: {problem}")))?;
+            Ok(CameraNoise { fit: profile.fit })
+        }
     }
 }
 

@@ -13,6 +13,9 @@ const EFFECTIVE_PIXELS: f64 = 8.0;
 /// The class's pixels carry its sum unevenly: S of them alike would give the same ratio of the squared sum to the sum of squares. The windows
 /// hold the same share of the class's pixels that [`EFFECTIVE_PIXELS`] are of S, at most all. Their size is one for the whole class, and does not
 /// follow what is found nearby: a window that may end where it has met nothing rare knows nothing of what is rare.
+///
+/// Beside a step the windows on its low side reach across and the mean of value over window is below 1. All of a class are scaled by one
+/// factor that brings it to 1.
 pub fn pooled(width: usize, values: &[Option<DVec3>], classes: &[u8]) -> Vec<DVec3> {
     let mut means = vec![DVec3::ZERO; values.len()];
     let height = values.len() / width.max(1);
@@ -45,6 +48,19 @@ pub fn pooled(width: usize, values: &[Option<DVec3>], classes: &[u8]) -> Vec<DVe
                 !enough
             });
             radius += 1 + radius / 2;
+        }
+        let members = || (0..values.len()).filter_map(|p| Some((p, member(p)?)));
+        let (mut ratios, mut count) = (0.0, 0.0);
+        for (pixel, value) in members() {
+            for (value, mean) in value.to_array().into_iter().zip(means[pixel].to_array()) {
+                if mean > 0.0 {
+                    ratios += value / mean;
+                    count += 1.0;
+                }
+            }
+        }
+        for (pixel, _) in members() {
+            means[pixel] *= ratios / count;
         }
     }
     means
@@ -185,6 +201,27 @@ mod tests {
         }
         let least = pool(0.01).iter().map(|m| m.x).fold(f64::MAX, f64::min);
         assert!(least > 0.1, "no window without the rare: {least}");
+    }
+
+    /// A dark half beside a bright one. Control: the windows alone.
+    #[test]
+    fn values_over_means_average_to_one() {
+        let (width, pixels) = (32, 32 * 32);
+        let value = |p| (if p % width < 16 { 0.01 } else { 1.0 }) * (0.5 + random(3, p));
+        let values: Vec<f64> = (0..pixels).map(value).collect();
+        let ratio = |means: &[f64]| {
+            let ratios = values.iter().zip(means).map(|(value, mean)| value / mean);
+            ratios.sum::<f64>() / pixels as f64
+        };
+        let three: Vec<_> = values.iter().map(|x| Some(DVec3::splat(*x))).collect();
+        let means: Vec<f64> = (pooled(width, &three, &vec![0; pixels]).iter())
+            .map(|m| m.x)
+            .collect();
+        assert!((ratio(&means) - 1.0).abs() < 1e-12);
+        let sums = box_sums(&values, width, 2);
+        let counts = box_sums(&vec![1.0; pixels], width, 2);
+        let alone: Vec<f64> = sums.iter().zip(counts).map(|(sum, n)| sum / n).collect();
+        assert!(ratio(&alone) < 0.98, "control: {}", ratio(&alone));
     }
 
     #[test]

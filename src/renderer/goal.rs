@@ -2,22 +2,19 @@
 
 use glam::DVec3;
 
-use crate::scene::srgb;
+use crate::scene::{NoiseFit, srgb};
 
-/// Noise of a camera: variance of an 8-bit code value (0..255, sRGB-encoded) as a straight line over it.
+/// Noise of a camera: variance of each channel's 8-bit code value (0..255, sRGB-encoded) as a straight line over it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraNoise {
-    /// Codes; the A of sigma^2 = A y + B. 0 or more.
-    pub slope: f64,
-    /// Codes squared; the B. 0 or more.
-    pub offset: f64,
+    pub fit: [NoiseFit; 3],
 }
 
 impl CameraNoise {
-    /// Variance of a linear value (clamped to 0..1 as the encoding does): sigma times the slope of the decoding.
-    pub fn linear_variance(&self, linear: f64) -> f64 {
+    /// Variance of a channel's linear value (clamped to 0..1 as the encoding does): sigma times the slope of the decoding.
+    pub fn linear_variance(&self, channel: usize, linear: f64) -> f64 {
         let encoded = srgb::encode(linear.clamp(0.0, 1.0));
-        let codes = self.slope * 255.0 * encoded + self.offset;
+        let codes = self.fit[channel].variance(255.0 * encoded);
         let slope = srgb::decode_slope(encoded) / 255.0;
         codes * slope * slope
     }
@@ -41,8 +38,9 @@ impl ErrorGoal {
     /// Variance that is allowed at a pixel of this colour, linear.
     pub(super) fn allowed_variance(&self, linear: [f32; 3]) -> DVec3 {
         let even = self.standard_error.map_or(0.0, |e| e * e);
-        DVec3::from(linear.map(|x| {
-            let noise = self.noise.map_or(0.0, |n| n.linear_variance(f64::from(x)));
+        DVec3::from(std::array::from_fn::<f64, 3, _>(|c| {
+            let noise = |n: &CameraNoise| n.linear_variance(c, f64::from(linear[c]));
+            let noise = self.noise.as_ref().map_or(0.0, noise);
             even.max(noise).max(f64::MIN_POSITIVE)
         }))
     }
@@ -55,8 +53,7 @@ mod tests {
     #[test]
     fn noise_in_linear_light_is_that_of_the_codes() {
         let noise = CameraNoise {
-            slope: 0.02,
-            offset: 0.5,
+            fit: [NoiseFit { a: 0.02, b: 0.5 }; 3],
         };
         for code in [3.0, 40.0, 200.0] {
             let linear = srgb::decode(code / 255.0);
@@ -66,9 +63,9 @@ mod tests {
                 - srgb::decode((code - step) / 255.0))
                 / (2.0 * step);
             let expected = (0.02 * code + 0.5) * by_code * by_code;
-            let found = noise.linear_variance(linear);
+            let found = noise.linear_variance(0, linear);
             assert!((found / expected - 1.0).abs() < 1e-4, "{found} {expected}");
-            let wrong = noise.linear_variance(linear * 1.1);
+            let wrong = noise.linear_variance(0, linear * 1.1);
             assert!(
                 (wrong / expected - 1.0).abs() > 1e-2 || code < 10.0,
                 "control"
@@ -79,8 +76,7 @@ mod tests {
     #[test]
     fn either_goal_is_enough() {
         let noise = CameraNoise {
-            slope: 0.0,
-            offset: 1.0,
+            fit: [NoiseFit { a: 0.0, b: 1.0 }; 3],
         };
         let goal = |standard_error, noise| ErrorGoal {
             standard_error,

@@ -30,11 +30,6 @@ impl Tiles {
         self.across * self.height.div_ceil(SIDE)
     }
 
-    /// Of the picture, pixels.
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
     pub fn of_pixel(&self, pixel: usize) -> usize {
         let (x, y) = (pixel % self.width, pixel / self.width);
         y / SIDE * self.across + x / SIDE
