@@ -45,6 +45,7 @@ struct Frame {
 const FRAME_ENV_DRAWN: u32 = 1u;
 const FRAME_AOVS: u32 = 2u;
 const FRAME_ALPHA: u32 = 4u;
+const FRAME_LIGHTS_SUFFICE: u32 = 8u;
 
 struct Vertex {
     position_u0: vec4<f32>,

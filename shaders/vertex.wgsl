@@ -1,6 +1,6 @@
 // One vertex of any path: emission, next event, cone direction, continuation. Rust twin: src/cpu/vertex.rs.
 
-import package::bindings::{NONE, frame, materials, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT};
+import package::bindings::{NONE, frame, materials, FRAME_LIGHTS_SUFFICE, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT};
 import package::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample};
 import package::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
 import package::contribution::{accumulate, density_weight, draw};
@@ -82,10 +82,20 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
         }
     }
     next_event(st, s, wo, roulette);
+    if lights_suffice(st, s) { return; }
     @if(!paper) {
         if difference { plan_cone(st, s, wo, roulette); }
     }
     plan_continuation(st, s, wo, roulette);
+}
+
+fn lights_suffice(st: ptr<function, PathState>, s: Surface) -> bool {
+    @if(paper) {
+        return false;
+    }
+    @else {
+        return (*st).depth >= frame.max_bounces && (frame.flags & FRAME_LIGHTS_SUFFICE) != 0u && bsdf_is_lambertian(s);
+    }
 }
 
 fn coincides(st: ptr<function, PathState>, s: Surface, distance: f32) -> bool {
@@ -130,7 +140,7 @@ fn light_contribution(
     let f = bsdf_eval(s, wo, l.direction);
     if max_element(f.f_cos) <= 0.0 { return vec3<f32>(0.0); }
     var weight = 1.0;
-    if !l.delta {
+    if !l.delta && !lights_suffice(st, s) {
         var other = f.pdf;
         @if(!paper) {
             if difference {

@@ -131,14 +131,14 @@ def equal_rays(reference, arguments):
     return ["scene", "renderer", f"RMSE at {rays_per_pixel} rays per pixel", "CPU secs", "1 / (CPU secs x MSE)"], rows
 
 
-def write_rows(section, header, rows):
+def write_rows(section, header, rows, path=PAGE):
     """Replaces the rows of a scene in the table between <!-- section --> and <!-- end -->."""
-    page = PAGE.read_text()
+    page = path.read_text()
     pattern = re.compile(rf"(<!-- {section} -->\n)(.*?)(<!-- end -->)", re.DOTALL)
     kept = [line for line in pattern.search(page)[2].splitlines()[2:] if not line.startswith(f"| {rows[0][0]} |")]
     table = [header, ["---"] * len(header), *rows]
     lines = ["| " + " | ".join(row) + " |" for row in table] + kept
-    PAGE.write_text(pattern.sub(lambda match: match[1] + "\n".join(lines) + "\n" + match[3], page))
+    path.write_text(pattern.sub(lambda match: match[1] + "\n".join(lines) + "\n" + match[3], page))
 
 
 def main():

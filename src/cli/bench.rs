@@ -11,9 +11,10 @@ use crate::output::{write_bytes, write_text};
 use crate::renderer::Skip;
 use crate::report::{
     Axis, FORMAT, Machine, Method, PAPER_SCENE, PaperRow, Plan, Plot, Reach, ReferenceGoal, Report,
-    Row, Shot, Source, Target, Truth, Verdict, against, cost_to_reach, csv, log_log_slope,
-    markdown, measure, page, paper_markdown, paper_rays_per_pixel, paper_rows, paper_text,
-    picture_png, plots, reference, replace_section, shrink, text,
+    Row, Shot, Source, Target, Truth, Verdict, against, cost_to_reach, csv, gpu_time,
+    gpu_time_markdown, gpu_time_text, log_log_slope, markdown, measure, page, paper_markdown,
+    paper_rays_per_pixel, paper_rows, paper_text, picture_png, plots, reference, replace_section,
+    shrink, text,
 };
 use crate::scene::{
     self, BackendChoice, Choice, Composite, Estimator, SamplerKind, Scene, Settings,
@@ -91,7 +92,11 @@ pub(super) struct Arguments {
     /// Writes stress.json, .csv and .md; exits with 1 if a case fails
     #[arg(long, conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate", "report", "paper_table"])]
     stress: bool,
-    /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->, <!-- stress -->) and <!-- end -->
+    /// Where the time of a GPU render goes, kernel by kernel, at each number of rays per pixel. Writes gpu-time.json
+    #[arg(long, conflicts_with_all = ["reference", "target_rmse", "against", "ablate", "report", "paper_table", "stress"])]
+    gpu_time: bool,
+    /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->, <!-- stress -->, <!-- gpu-time -->) and
+    /// <!-- end -->
     #[arg(long, value_name = "FILE")]
     write_docs: Option<PathBuf>,
     /// CPU threads [default: all]
@@ -127,6 +132,8 @@ impl Arguments {
             "stress"
         } else if self.paper_table {
             "paper-table"
+        } else if self.gpu_time {
+            "gpu-time"
         } else if self.ablate {
             "ablate"
         } else {
@@ -259,6 +266,9 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     }
     if job.arguments.paper_table {
         return paper_table(&job);
+    }
+    if job.arguments.gpu_time {
+        return gpu_times(&job);
     }
     let (report, interrupted) = match &job.arguments.report {
         Some(path) => (read_report(path)?, false),
@@ -607,5 +617,46 @@ fn paper_table(job: &Job) -> Result<Outcome, Failure> {
         Outcome::Interrupted
     } else {
         Outcome::Done
+    })
+}
+
+fn gpu_times(job: &Job) -> Result<Outcome, Failure> {
+    let interrupted = interrupt::watch()?;
+    let scenes = load_scenes(&job.arguments, false)?;
+    let steps = progress::Steps::new((scenes.len() * job.arguments.rpp.len()) as u64);
+    let mut times = Vec::new();
+    'scenes: for scene in &scenes {
+        for &rays_per_pixel in &job.arguments.rpp {
+            steps.say(&format!("{}: {rays_per_pixel} rays per pixel", scene.name));
+            let Some(time) = gpu_time(scene, rays_per_pixel)? else {
+                return Err(Failure(
+                    "the graphics device takes no timestamps; expected one that does (`mixray info` says)"
+                        .to_owned(),
+                ));
+            };
+            times.push(time);
+            steps.step();
+            if interrupted.is_set() {
+                break 'scenes;
+            }
+        }
+    }
+    steps.clear();
+    let mut json = serde_json::to_string_pretty(&serde_json::json!({
+        "format": FORMAT,
+        "mixray": env!("CARGO_PKG_VERSION"),
+        "command": command_line(),
+        "machine": job.machine,
+        "times": times,
+    }))?;
+    json.push('\n');
+    write_text(&job.arguments.output.join("gpu-time.json"), &json)?;
+    print(&gpu_time_text(&job.machine, &times));
+    if let Some(docs) = &job.docs {
+        docs.write(&gpu_time_markdown(&command_line(), &job.machine, &times))?;
+    }
+    Ok(match interrupted.is_set() {
+        true => Outcome::Interrupted,
+        false => Outcome::Done,
     })
 }

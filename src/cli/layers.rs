@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{Failure, read_photo};
 use crate::film::Picture;
-use crate::output::PngBits;
+use crate::output::{ChannelFile, PngBits};
 use crate::scene::{EncodedPhoto, Photo};
 
 #[derive(Debug, Args)]
@@ -15,9 +15,9 @@ pub(super) struct LayerArguments {
     photo: PathBuf,
     /// The virtual things, not premultiplied, of the photograph's size; pixels outside the mask are not read
     layer: PathBuf,
-    /// Grey picture: how much of each pixel is virtual, black 0, white 1
+    /// Grey picture: how much of each pixel is virtual, black 0, white 1; of an EXR file the channel mask.Y, A, Y or R
     mask: PathBuf,
-    /// MASK is a depth picture: what is nearer than the far limit is virtual
+    /// MASK is a depth picture: what is nearer than the far limit is virtual; of an EXR file the channel depth.Z, Depth.Z, Z, Y or R
     #[arg(long)]
     depth: bool,
     /// The far limit: white is 1, EXR values are as stored
@@ -36,10 +36,10 @@ impl LayerArguments {
     pub(super) fn read(&self) -> Result<Layers, Failure> {
         let photo = read_photo(&self.photo)?;
         let layer = read_photo(&self.layer)?;
-        let mask = read_photo(&self.mask)?;
-        self.check_size(&photo, &layer, &self.layer)?;
-        self.check_size(&photo, &mask, &self.mask)?;
-        let mask = self.coverage(&mask);
+        let mask = self.read_mask()?;
+        self.check_size(&photo, (layer.width, layer.height), &self.layer)?;
+        self.check_size(&photo, (mask.width, mask.height), &self.mask)?;
+        let mask = self.coverage(mask.values);
         let linear = photo
             .linear
             .iter()
@@ -65,30 +65,87 @@ impl LayerArguments {
         })
     }
 
-    fn check_size(&self, photo: &Photo, other: &Photo, path: &Path) -> Result<(), Failure> {
-        if (photo.width, photo.height) == (other.width, other.height) {
+    fn check_size(&self, photo: &Photo, size: (u32, u32), path: &Path) -> Result<(), Failure> {
+        if (photo.width, photo.height) == size {
             return Ok(());
         }
         Err(Failure(format!(
             "{}: it has {} x {} pixels where the photograph {} has {} x {}; expected one size",
             path.display(),
-            other.width,
-            other.height,
+            size.0,
+            size.1,
             self.photo.display(),
             photo.width,
             photo.height
         )))
     }
 
-    /// 0 to 1; the first channel as stored, no curve.
-    fn coverage(&self, mask: &Photo) -> Vec<f32> {
-        let stored: Vec<f32> = match &mask.encoded {
+    /// The mask or depth as stored, no curve.
+    fn read_mask(&self) -> Result<Plane, Failure> {
+        if self
+            .mask
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("exr"))
+        {
+            return self.read_channel();
+        }
+        let mask = read_photo(&self.mask)?;
+        let values = match &mask.encoded {
             EncodedPhoto::Srgb8(codes) => codes.iter().map(|c| f32::from(c[0]) / 255.0).collect(),
             EncodedPhoto::Srgb16(codes) => {
                 codes.iter().map(|c| f32::from(c[0]) / 65535.0).collect()
             }
             EncodedPhoto::Linear => mask.linear.iter().map(|value| value[0]).collect(),
         };
+        Ok(Plane {
+            width: mask.width,
+            height: mask.height,
+            values,
+        })
+    }
+
+    /// Of an OpenEXR file, which may hold much else.
+    fn read_channel(&self) -> Result<Plane, Failure> {
+        let mut file = ChannelFile::read(&self.mask).map_err(Failure)?;
+        let wanted: &[&str] = match self.depth {
+            true => &["depth.Z", "Depth.Z", "Z", "Y", "R"],
+            false => &["mask.Y", "A", "Y", "R"],
+        };
+        let found = wanted.iter().find_map(|&wanted| {
+            let mut names = file.floats.keys();
+            // Blender puts the name of the view layer in front.
+            let name = names.find(|name| {
+                let rest = name.strip_suffix(wanted);
+                rest.is_some_and(|rest| {
+                    rest.is_empty() || (rest.ends_with('.') && wanted.contains('.'))
+                })
+            });
+            name.cloned()
+        });
+        let Some(values) = found.and_then(|name| file.floats.remove(&name)) else {
+            return Err(Failure(format!(
+                "{}: it has no float channel named {}; expected one of them; write it into the file",
+                self.mask.display(),
+                wanted.join(", ")
+            )));
+        };
+        if let Some(bad) = values.iter().position(|value| value.is_nan()) {
+            return Err(Failure(format!(
+                "{}: pixel ({}, {}) is NaN; expected numbers; repair the file",
+                self.mask.display(),
+                bad % file.width as usize,
+                bad / file.width as usize
+            )));
+        }
+        Ok(Plane {
+            width: file.width,
+            height: file.height,
+            values,
+        })
+    }
+
+    /// 0 to 1.
+    fn coverage(&self, stored: Vec<f32>) -> Vec<f32> {
         stored
             .into_iter()
             .map(|value| match self.depth {
@@ -97,6 +154,13 @@ impl LayerArguments {
             })
             .collect()
     }
+}
+
+/// One number a pixel.
+struct Plane {
+    width: u32,
+    height: u32,
+    values: Vec<f32>,
 }
 
 impl Layers {

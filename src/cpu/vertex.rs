@@ -12,7 +12,10 @@ use crate::material::{
     Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample,
 };
 use crate::math::{dot3, exp_, safe_sqrt};
-use crate::packed::{MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE, PackedScene};
+use crate::packed::{
+    FRAME_LIGHTS_SUFFICE, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE,
+    PackedScene,
+};
 
 /// Paths shorter than this are never ended by roulette.
 const ROULETTE_FROM_DEPTH: u32 = 2;
@@ -81,10 +84,22 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
 
     let techniques = difference.then(|| techniques_at(scene, st, s, wo));
     next_event(scene, st, s, wo, techniques.as_ref());
+    if lights_suffice(scene, st, s) {
+        return;
+    }
     if let Some(techniques) = &techniques {
         plan_cone(scene, st, s, wo, techniques);
     }
     plan_continuation(scene, st, s, wo, techniques.as_ref());
+}
+
+/// Whether the light drawn at the vertex is all the light there is to find: past the last vertex a path finds only emitters. (`paper` traces
+/// the rays of its rules all the same.)
+fn lights_suffice(scene: &PackedScene, st: &PathState, s: &Surface) -> bool {
+    st.depth >= scene.frame.max_bounces
+        && scene.frame.flags & FRAME_LIGHTS_SUFFICE != 0
+        && scene.frame.estimator != ESTIMATOR_PAPER
+        && bsdf_is_lambertian(s)
 }
 
 fn techniques_at(scene: &PackedScene, st: &PathState, s: &Surface, wo: Vec3) -> Techniques {
@@ -180,7 +195,7 @@ fn light_contribution(
         return Vec3::ZERO;
     }
     let mut weight = 1.0;
-    if !l.delta {
+    if !l.delta && !lights_suffice(scene, st, s) {
         let mut other = f.pdf;
         if let Some(t) = techniques {
             other = t.cone_probability * cone_pdf(&t.cones, l.direction);

@@ -202,6 +202,7 @@ fn constants_have_the_same_values_on_both_sides() {
         FRAME_ENV_DRAWN,
         FRAME_AOVS,
         FRAME_ALPHA,
+        FRAME_LIGHTS_SUFFICE,
         MATERIAL_LAMBERTIAN,
         MATERIAL_ALPHA_MASK,
         MATERIAL_ALPHA_BLEND,

@@ -3,6 +3,6 @@
 pub mod cones;
 pub mod environment;
 pub mod lights;
-mod rectangle;
+pub(crate) mod rectangle;
 #[cfg(test)]
 mod tests;

@@ -34,6 +34,20 @@ pub struct Rectangle {
     start: f32,
 }
 
+fn is_right_angle(ex: Vec3, ey: Vec3) -> bool {
+    dot3(ex, ey).abs() <= RIGHT_ANGLE
+}
+
+/// Whether the edges of a quad light make a right angle.
+pub fn is_rectangle(light: &Light) -> bool {
+    let [ux, uy, uz, _] = light.axis_u;
+    let [vx, vy, vz, _] = light.axis_v;
+    is_right_angle(
+        Vec3::new(ux, uy, uz).normalize_or_zero(),
+        Vec3::new(vx, vy, vz).normalize_or_zero(),
+    )
+}
+
 /// The quad `light` from `position`; `solid_angle` 0 for other lights, oblique quads, the dark side and small solid angles.
 pub fn rectangle_from(light: &Light, position: Vec3) -> Rectangle {
     let [ux, uy, uz, _] = light.axis_u;
@@ -59,7 +73,7 @@ pub fn rectangle_from(light: &Light, position: Vec3) -> Rectangle {
         solid_angle: 0.0,
         start: 0.0,
     };
-    if light.kind != LIGHT_QUAD || dot3(ex, ey).abs() > RIGHT_ANGLE || r.height <= 0.0 {
+    if light.kind != LIGHT_QUAD || !is_right_angle(ex, ey) || r.height <= 0.0 {
         return r;
     }
     let inv_height = 1.0 / r.height;

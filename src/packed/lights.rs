@@ -3,9 +3,11 @@
 use glam::{DVec3, Vec2, Vec3};
 
 use super::{
-    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, LIGHT_TRIANGLE,
-    Light, MATERIAL_QUAD_LIGHT, NONE, PackedScene, TEXTURE_UV1,
+    FRAME_LIGHTS_SUFFICE, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD,
+    LIGHT_SPOT, LIGHT_TRIANGLE, Light, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT, Material, NONE,
+    PackedScene, TEXTURE_UV1,
 };
+use crate::light::rectangle::is_rectangle;
 use crate::material::texture_sample;
 use crate::math::luminance;
 use crate::scene::{LightKind, Scene, Side};
@@ -20,6 +22,9 @@ const EMISSION_POINTS: [[f32; 2]; 7] = [
     [0.9, 0.05],
     [0.05, 0.9],
 ];
+
+/// More lights than this are chosen between too blindly to leave all to the choice.
+const FEW_LIGHTS: usize = 4;
 
 /// Fills `packed.lights`, the triangles' light indices and the frame's light fields.
 pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
@@ -49,7 +54,26 @@ pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
     }
     set_probabilities(&mut lights, &powers);
     packed.frame.light_count = lights.len() as u32;
+    packed.frame.flags &= !FRAME_LIGHTS_SUFFICE;
+    if lights_suffice(&lights, &packed.materials) {
+        packed.frame.flags |= FRAME_LIGHTS_SUFFICE;
+    }
     packed.lights = lights;
+}
+
+/// Whether light comes from a few point-like and rectangular lights alone: rectangles are drawn by solid angle, so that no point near them finds
+/// them by chance better.
+fn lights_suffice(lights: &[Light], materials: &[Material]) -> bool {
+    lights.len() <= FEW_LIGHTS
+        && lights.iter().all(|l| match l.kind {
+            LIGHT_QUAD => is_rectangle(l),
+            LIGHT_DIRECTIONAL | LIGHT_POINT | LIGHT_SPOT => true,
+            _ => false,
+        })
+        && materials.iter().all(|m| {
+            let emits = m.flags & MATERIAL_UNLIT != 0 || m.emissive.iter().any(|&c| c > 0.0);
+            m.flags & MATERIAL_QUAD_LIGHT != 0 || !emits
+        })
 }
 
 /// Radius about the anchor that holds three quarters of the vertices: outliers must not make the environment seem all-important.

@@ -73,6 +73,8 @@ pub const FRAME_ENV_DRAWN: u32 = 1;
 pub const FRAME_AOVS: u32 = 2;
 /// Some material is alpha-masked or blended.
 pub const FRAME_ALPHA: u32 = 4;
+/// All light comes from a few lights that are drawn well wherever they are seen from: the last diffuse vertex need not look for it.
+pub const FRAME_LIGHTS_SUFFICE: u32 = 8;
 
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -1,11 +1,14 @@
 //! Packing against what the scene says, in f64.
 
+use std::sync::Arc;
+
 use glam::{DMat4, DVec3, Vec3};
 
 use super::*;
 use crate::accel::Ray;
 use crate::scene::{
-    AlphaMode, Light as SceneLight, LightKind, Material as SceneMaterial, Scene, Side,
+    AlphaMode, Environment, EnvironmentMap, Light as SceneLight, LightKind,
+    Material as SceneMaterial, Scene, Side,
 };
 
 const TETRAHEDRON: [[f32; 3]; 4] = [
@@ -260,4 +263,46 @@ fn rebuilding_the_virtual_part_equals_building_anew() {
     let first = packed.frame.real_triangle_count as usize;
     let corner = packed.position(packed.triangles[first].vertices[0]);
     assert!((corner.as_dvec3() - moved).length() < 1e-6);
+}
+
+#[test]
+fn rectangles_and_points_suffice_and_nothing_else_does() {
+    let suffice = |edit: &dyn Fn(&mut Scene)| {
+        let mut scene = two_objects(DVec3::ZERO);
+        scene.lights = vec![
+            quad(Side::Real, 0.0),
+            SceneLight {
+                kind: LightKind::Point {
+                    position: [0.0, 2.0, 0.0],
+                    intensity: [1.0; 3],
+                },
+                side: Side::Virtual,
+            },
+        ];
+        edit(&mut scene);
+        pack(&scene).frame.flags & FRAME_LIGHTS_SUFFICE != 0
+    };
+    assert!(suffice(&|_| ()));
+    assert!(suffice(&|scene| scene.lights.clear()));
+    assert!(!suffice(&|scene| {
+        if let LightKind::Quad { edge_v, .. } = &mut scene.lights[0].kind {
+            edge_v[0] = 0.1;
+        }
+    }));
+    assert!(!suffice(&|scene| {
+        scene.lights = (0..5).map(|i| quad(Side::Real, f64::from(i))).collect();
+    }));
+    assert!(!suffice(&|scene| {
+        Arc::make_mut(&mut scene.objects[0].instances[0].material).emissive = [0.1; 3];
+    }));
+    assert!(!suffice(&|scene| {
+        Arc::make_mut(&mut scene.objects[1].instances[0].material).unlit = true;
+    }));
+    assert!(!suffice(&|scene| {
+        scene.environment = Some(Environment {
+            map: EnvironmentMap::Constant([0.1; 3]),
+            rotation_deg: 0.0,
+            scale: 1.0,
+        });
+    }));
 }

@@ -43,7 +43,7 @@ use crate::film::{
     Film, MergeError, Picture, Planes, RealSurface, composite, estimated_error, filter_difference,
     planes,
 };
-use crate::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError};
+use crate::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError, KernelSeconds};
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Side};
 
@@ -542,6 +542,22 @@ impl Renderer {
         match &self.backend {
             Backend::Cpu | Backend::Undecided => None,
             Backend::Gpu(gpu) => Some(gpu.device()),
+        }
+    }
+
+    /// Takes the time of every kernel from now on, at a small cost; false where no graphics device renders, or it takes no timestamps.
+    pub fn profile_gpu(&mut self) -> bool {
+        match &mut self.backend {
+            Backend::Cpu | Backend::Undecided => false,
+            Backend::Gpu(gpu) => gpu.profile(),
+        }
+    }
+
+    /// Seconds by kernel since [`Renderer::profile_gpu`].
+    pub fn gpu_kernel_seconds(&self) -> Option<KernelSeconds> {
+        match &self.backend {
+            Backend::Cpu | Backend::Undecided => None,
+            Backend::Gpu(gpu) => gpu.kernel_seconds(),
         }
     }
 

@@ -1,5 +1,8 @@
 //! The commands for pictures of other programs: what they write, and what they refuse.
 
+use exr::WritableImage as _;
+use exr::prelude as exr;
+
 use super::support::{Folder, Rng, open, spread};
 
 fn noisy(folder: &Folder, name: &str, level: f64, sigma: f64, seed: u64) {
@@ -103,6 +106,84 @@ fn calibrate_writes_a_profile_that_apply_uses() {
         level(&apply("d.png", &["--scale", "0"])) < 0.01,
         "control: no noise"
     );
+}
+
+/// Channels of 64 x 48 pixels in one OpenEXR file.
+fn save_exr(folder: &Folder, name: &str, channels: &[(&str, &dyn Fn(usize) -> f32)]) {
+    let list = channels.iter().map(|(name, value)| {
+        let samples = (0..64 * 48).map(|i| value(i % 64)).collect();
+        exr::AnyChannel::new(*name, exr::FlatSamples::F32(samples))
+    });
+    let layer = exr::Layer::new(
+        exr::Vec2(64, 48),
+        exr::LayerAttributes::default(),
+        exr::Encoding::FAST_LOSSLESS,
+        exr::AnyChannels::sort(list.collect()),
+    );
+    let written = exr::Image::from_layer(layer)
+        .write()
+        .to_file(folder.path(name));
+    written.unwrap();
+}
+
+#[test]
+fn open_exr_channels_say_what_is_virtual() {
+    let folder = Folder::new();
+    layers(&folder);
+    let decoy = |_: usize| 0.5;
+    let mask = |x: usize| if x < 32 { 0.0 } else { 1.0 };
+    let depth = |x: usize| if x < 32 { f32::INFINITY } else { 3.0 };
+    save_exr(
+        &folder,
+        "own.exr",
+        &[
+            ("R", &decoy),
+            ("normal.Z", &decoy),
+            ("mask.Y", &mask),
+            ("depth.Z", &depth),
+        ],
+    );
+    save_exr(
+        &folder,
+        "other.exr",
+        &[
+            ("ViewLayer.Normal.Z", &decoy),
+            ("ViewLayer.Depth.Z", &depth),
+        ],
+    );
+    let run = |mask: &str, more: &[&str]| {
+        let mut arguments = vec!["antialias", "photo.png", "layer.png", mask, "-o", "out.png"];
+        arguments.extend(more);
+        folder.run(&arguments)
+    };
+    let picture = |mask: &str, more: &[&str]| {
+        let output = run(mask, more);
+        assert_eq!(output.status.code(), Some(0), "{mask} {output:?}");
+        open(&folder.path("out.png"))
+    };
+    let expected = picture("mask.png", &[]);
+    assert_eq!(expected, picture("own.exr", &[]));
+    let far: &[&str] = &["--depth", "--far", "1e6"];
+    assert_eq!(expected, picture("own.exr", far));
+    assert_eq!(expected, picture("other.exr", far));
+    assert_ne!(
+        expected,
+        picture("other.exr", &["--depth", "--far", "2"]),
+        "control"
+    );
+    let refused = |mask: &str| {
+        let output = run(mask, &[]);
+        assert_eq!(output.status.code(), Some(2));
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    assert!(refused("other.exr").contains("expected one of them"));
+    save_exr(
+        &folder,
+        "nan.exr",
+        &[("mask.Y", &|x| if x == 5 { f32::NAN } else { 0.0 })],
+    );
+    assert!(refused("nan.exr").contains("pixel (5, 0) is NaN"));
+    assert!(refused("absent.exr").contains("absent.exr"));
 }
 
 #[test]
