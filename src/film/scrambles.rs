@@ -28,11 +28,11 @@ impl Channel {
         for (mean, step) in self.mean.iter_mut().zip(from_old_mean) {
             *mean += step / f64::from(count);
         }
-        let mut at = 0;
-        for i in 0..TERMS {
-            for j in i..TERMS {
-                self.products[at] += from_old_mean[i] * (terms[j] - self.mean[j]);
-                at += 1;
+        let mut products = self.products.iter_mut();
+        for (i, old) in from_old_mean.iter().enumerate() {
+            let from_new_mean = terms.iter().zip(&self.mean).skip(i);
+            for ((term, mean), product) in from_new_mean.zip(&mut products) {
+                *product += old * (term - mean);
             }
         }
     }
