@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::render::choice;
+use super::render::{above_zero, choice};
 use super::{Failure, Outcome, interrupt, print, progress, say, stress};
 use crate::output::{write_bytes, write_text};
 use crate::renderer::Skip;
@@ -70,6 +70,9 @@ pub(super) struct Arguments {
     /// Measure `direct` without each of its savings too
     #[arg(long)]
     ablate: bool,
+    /// Measure `direct` with the preview filter too
+    #[arg(long)]
+    filter: bool,
     /// Find the time that each method needs for this RMSE
     #[arg(long, value_name = "X", value_parser = above_zero)]
     target_rmse: Option<f64>,
@@ -99,13 +102,6 @@ pub(super) struct Arguments {
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-}
-
-fn above_zero(text: &str) -> Result<f64, &'static str> {
-    match text.parse::<f64>() {
-        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        _ => Err("expected a number above 0"),
-    }
 }
 
 /// What was asked for, with files that can be read and written.
@@ -200,11 +196,18 @@ impl Arguments {
                             sampler,
                             composite,
                             without: None,
+                            filter: false,
                         };
                         if methods.contains(&method) {
                             continue;
                         }
                         methods.push(method);
+                        if self.filter && estimator == Estimator::Direct {
+                            methods.push(Method {
+                                filter: true,
+                                ..method
+                            });
+                        }
                         if self.ablate && estimator == Estimator::Direct {
                             methods.extend(without_each(method));
                         }

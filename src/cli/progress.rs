@@ -7,25 +7,31 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::renderer::Progress;
 
-const FIRST: &str = "{wide_bar} {pos}/{len} rays per pixel";
-const RUNNING: &str = "{wide_bar} {pos}/{len} rays per pixel, {msg} Mrays/s, {eta} left";
-
-pub(super) struct Bar(Option<ProgressBar>);
+/// What a render counts: "rays per pixel" or "scrambles".
+pub(super) struct Bar {
+    bar: Option<ProgressBar>,
+    unit: &'static str,
+}
 
 impl Bar {
-    pub(super) fn new(rays_per_pixel: u32) -> Self {
-        if !std::io::stderr().is_terminal() {
-            return Self(None);
-        }
-        let bar = ProgressBar::new(u64::from(rays_per_pixel));
-        set_template(&bar, FIRST);
-        bar.enable_steady_tick(Duration::from_millis(200));
-        Self(Some(bar))
+    pub(super) fn new(total: u32, unit: &'static str) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(u64::from(total));
+            set_template(&bar, &format!("{{wide_bar}} {{pos}}/{{len}} {unit}"));
+            bar.enable_steady_tick(Duration::from_millis(200));
+            bar
+        });
+        Self { bar, unit }
     }
 
     pub(super) fn show(&self, progress: &Progress) {
-        if let Some(bar) = &self.0 {
-            set_template(bar, RUNNING);
+        if let Some(bar) = &self.bar {
+            let unit = self.unit;
+            set_template(
+                bar,
+                &format!("{{wide_bar}} {{pos}}/{{len}} {unit}, {{msg}} Mrays/s, {{eta}} left"),
+            );
+            bar.set_length(u64::from(progress.samples_total));
             bar.set_position(u64::from(progress.samples));
             let seconds = progress.elapsed.as_secs_f64().max(1e-9);
             let rate = progress.rays.traced() as f64 / seconds / 1e6;
@@ -34,7 +40,7 @@ impl Bar {
     }
 
     pub(super) fn clear(&self) {
-        if let Some(bar) = &self.0 {
+        if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
     }

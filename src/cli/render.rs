@@ -12,10 +12,12 @@ use crate::output::{
     FilmNote, Format, Metadata, PngBits, Target, check_distinct, check_writable, write_exr,
     write_film, write_png, write_text,
 };
-use crate::renderer::{Budget, Renderer, RendererOptions, Skip, Stats, Without};
+use crate::renderer::{
+    Budget, CameraNoise, ErrorGoal, Renderer, RendererOptions, SCRAMBLES, Skip, Stats, Without,
+};
 use crate::scene::{
-    self, BackendChoice, Choice, Composite, Estimator, MotionBlurMethod, Overrides, SamplerKind,
-    Settings,
+    self, BackendChoice, Choice, Composite, Estimator, MotionBlurMethod, NoiseFit, NoiseProfile,
+    Overrides, SamplerKind, Settings,
 };
 use crate::stages::finish;
 
@@ -58,6 +60,20 @@ pub(super) struct Arguments {
     /// Render only these of each pixel's rays, FROM to TO - 1, into an .exr that `mixray merge` puts together with the others
     #[arg(long, value_name = "FROM..TO", value_parser = sample_range)]
     range: Option<(u32, u32)>,
+    /// Render until the standard error of the composite is down to this, root mean square over each tile of 16 x 16 pixels, linear;
+    /// --rpp then limits the rays of a pixel [default: 16384]
+    #[arg(long, value_name = "E", value_parser = above_zero, conflicts_with = "range")]
+    target_error: Option<f64>,
+    /// camera-noise: render until the variance of the composite is no more than that of the camera's noise
+    #[arg(long, value_name = "WHEN", value_parser = ["camera-noise"], conflicts_with = "range")]
+    stop_at: Option<String>,
+    /// The camera's noise: a file of `mixray noise calibrate`, or sigma^2 = A y + B in 8-bit code values y of the encoded picture
+    /// [default: the profile of the scene's [noise]]
+    #[arg(long, value_name = "NOISE.toml|A,B", requires = "stop_at")]
+    camera_noise: Option<String>,
+    /// Smooth what virtual objects change on diffuse real surfaces, for previews of a few rays per pixel: biased
+    #[arg(long, conflicts_with = "range")]
+    filter: bool,
     /// Do without a saving, to see what it is worth; may be given several times
     #[arg(long, value_name = "NAME", value_parser = choice::<Skip>())]
     no_skip: Vec<Skip>,
@@ -94,6 +110,10 @@ pub(super) struct Job {
     threads: Option<u16>,
     range: Option<(u32, u32)>,
     without: Without,
+    goal: Option<ErrorGoal>,
+    /// The goal is the camera's noise, which the scene tells.
+    noise_of_scene: bool,
+    filter: bool,
 }
 
 impl Arguments {
@@ -111,11 +131,16 @@ impl Arguments {
                 "--range wants an .exr to write (-o part.exr): other pictures do not keep the film";
             return Err(Failure(message.to_owned()));
         }
+        let goal = self.goal()?;
         Ok(Job {
+            noise_of_scene: self.stop_at.is_some() && self.camera_noise.is_none(),
+            goal,
+            filter: self.filter,
             scene: self.scene,
             targets,
             overrides: Overrides {
-                rays_per_pixel: self.rpp,
+                // With a goal it is a limit, and not what the pilot plans for.
+                rays_per_pixel: self.rpp.filter(|_| goal.is_none()),
                 max_bounces: self.max_bounces,
                 seed: self.seed,
                 estimator: self.estimator,
@@ -133,6 +158,24 @@ impl Arguments {
     }
 }
 
+impl Arguments {
+    fn goal(&self) -> Result<Option<ErrorGoal>, Failure> {
+        if self.target_error.is_none() && self.stop_at.is_none() {
+            return Ok(None);
+        }
+        if self.rpp.is_some_and(|rpp| rpp < SCRAMBLES) {
+            return Err(Failure(format!(
+                "--rpp limits the rays of a pixel here: the error is taken from {SCRAMBLES} renders, each of one ray or more"
+            )));
+        }
+        Ok(Some(ErrorGoal {
+            standard_error: self.target_error,
+            noise: self.camera_noise.as_deref().map(camera_noise).transpose()?,
+            max_rays_per_pixel: self.rpp.unwrap_or(ErrorGoal::DEFAULT_MAX_RAYS_PER_PIXEL),
+        }))
+    }
+}
+
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     if let Some(threads) = job.threads {
         rayon::ThreadPoolBuilder::new()
@@ -142,6 +185,18 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let start = Instant::now();
     let mut scene = scene::load(&job.scene)?;
     scene.settings.apply(&job.overrides);
+    let mut goal = job.goal;
+    if let Some(goal) = goal.as_mut().filter(|_| job.noise_of_scene) {
+        let Some(noise) = &scene.stages.noise else {
+            return Err(Failure(format!(
+                "{} has no [noise]: --stop-at camera-noise wants --camera-noise NOISE.toml or A,B",
+                job.scene.display()
+            )));
+        };
+        goal.noise = Some(CameraNoise {
+            fit: noise.profile.fit,
+        });
+    }
     for warning in &scene.warnings {
         say("warning", warning);
     }
@@ -162,14 +217,22 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         all_planes: targets.iter().any(|t| t.format() == Format::Exr),
         sample_range: job.range,
         without: job.without,
+        filter: job.filter,
     };
     let mut renderer = Renderer::new(scene, options)?;
     let interrupted = interrupt::watch()?;
     let (first, end) = (job.range).unwrap_or((0, renderer.scene().settings.rays_per_pixel));
-    let bar = progress::Bar::new(end - first);
-    let result = renderer.advance(Budget::Complete, &|| interrupted.is_set(), &mut |p| {
-        bar.show(&p);
-    });
+    let unit = if goal.is_some() {
+        "scrambles"
+    } else {
+        "rays per pixel"
+    };
+    let bar = progress::Bar::new(end - first, unit);
+    let cancelled = || interrupted.is_set();
+    let result = match &goal {
+        Some(goal) => renderer.render_to_error(goal, &cancelled, &mut |p| bar.show(&p)),
+        None => renderer.advance(Budget::Complete, &cancelled, &mut |p| bar.show(&p)),
+    };
     bar.clear();
     result?;
     for note in renderer.notes() {
@@ -238,7 +301,7 @@ pub(super) fn write(
                 write_png(target, &picture, photo, bits)?;
             }
             Format::Exr => {
-                let metadata = Metadata::new(renderer.scene(), renderer.samples());
+                let metadata = Metadata::of(renderer);
                 let planes = renderer.planes();
                 if with_film {
                     let film = renderer.film();
@@ -253,6 +316,34 @@ pub(super) fn write(
         }
     }
     Ok(())
+}
+
+pub(super) fn above_zero(text: &str) -> Result<f64, &'static str> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("expected a number above 0"),
+    }
+}
+
+/// "0.01,0.2", or the name of a file.
+fn camera_noise(text: &str) -> Result<CameraNoise, Failure> {
+    let parse = |part: &str| part.trim().parse::<f64>().ok();
+    let numbers: Option<Vec<f64>> = text.split(',').map(parse).collect();
+    match numbers.as_deref() {
+        Some(&[a, b]) if a >= 0.0 && b >= 0.0 && a + b > 0.0 && (a + b).is_finite() => {
+            Ok(CameraNoise {
+                fit: [NoiseFit { a, b }; 3],
+            })
+        }
+        Some(_) => Err(Failure(format!(
+            "--camera-noise {text}: expected two numbers of 0 or more, not both 0, such as 0.02,0.5"
+        ))),
+        None => {
+            let profile = NoiseProfile::read(Path::new(text))
+                .map_err(|problem| Failure(format!("{text}: {problem}")))?;
+            Ok(CameraNoise { fit: profile.fit })
+        }
+    }
 }
 
 /// "16..32".

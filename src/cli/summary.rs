@@ -1,26 +1,56 @@
 //! The few lines that a render ends with.
 
-use crate::film::estimated_error;
 use crate::output::Target;
-use crate::renderer::{Renderer, Stats};
+use crate::renderer::{Renderer, SCRAMBLES, Stated, Stats};
 
 pub(super) fn text(renderer: &Renderer, stats: &Stats, targets: &[Target]) -> String {
     let film = renderer.film();
-    let error = estimated_error(film, renderer.scene().photo.as_ref());
+    let rays = match renderer.stated() {
+        Some(stated) => format!(
+            "{:.1} rays per pixel on average",
+            stated.mean_rays_per_pixel
+        ),
+        None => format!("{} rays per pixel", renderer.samples()),
+    };
     let mut out = String::new();
     for target in targets {
         out += &format!(
-            "picture {} ({} x {}, {} rays per pixel)\n",
+            "picture {} ({} x {}, {rays})\n",
             target.path().display(),
             film.width,
             film.height,
-            renderer.samples()
         );
     }
-    out + &lines(stats, error)
+    let error = match renderer.stated() {
+        Some(stated) => from_scrambles(stated),
+        None => format!(
+            "{:.2e} RMS, linear: an upper estimate, from the variance of the samples",
+            stats.error.rms
+        ),
+    };
+    out += &lines(stats, &error);
+    if renderer.is_filtered() {
+        out += "filter  the difference on diffuse real surfaces is smoothed, a bias; the error is that before the filter\n";
+    }
+    out
 }
 
-fn lines(stats: &Stats, error: f64) -> String {
+fn from_scrambles(stated: &Stated) -> String {
+    let short = if stated.scrambles < SCRAMBLES {
+        " (ended early: too few to trust)"
+    } else {
+        ""
+    };
+    format!(
+        "{:.2e} RMS, linear: a standard error, from {} independent scrambles{short}; {} of {} tiles stay above the goal",
+        stated.rms(),
+        stated.scrambles,
+        stated.tiles_above_goal,
+        stated.tiles
+    )
+}
+
+fn lines(stats: &Stats, error: &str) -> String {
     let s = &stats.seconds;
     let r = &stats.rays;
     let p = &stats.pixels;
@@ -36,7 +66,7 @@ fn lines(stats: &Stats, error: f64) -> String {
         "time    {:.2} s: load {:.2}, build {:.2}, compile {:.2}, render {:.2}, write {:.2}\n\
          rays    {} primary, {} in all: mixed {}, real {}, mixed shadow {}, real shadow {}; {rate:.2} Mrays/s on {} ({})\n\
          pixels  {} skipped, {} background, {} edge, {} virtual\n\
-         error   {error:.2e} RMS, linear: an upper estimate, from the variance of the samples\n",
+         error   {error}\n",
         s.load + s.build + s.compile + s.render + s.write,
         s.load,
         s.build,

@@ -5,7 +5,9 @@ pub mod estimator;
 pub mod pilot;
 pub mod render;
 pub mod state;
+mod surfaces;
 pub mod trace;
 pub mod vertex;
 
 pub use pilot::pilot;
+pub use surfaces::diffuse_surfaces;

@@ -10,7 +10,7 @@ use super::estimator::{advance, begin_sample, samples_without_turn};
 use super::state::{PathState, RayCounts, STAGE_DONE};
 use super::trace::answer;
 use crate::film::{Film, Guide, GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
-use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene};
+use crate::packed::{PIXEL_EDGE, PIXEL_OUT_OF_REACH, PackedScene};
 use crate::renderer::{Cancel, Pass, RayTotals};
 
 /// Pixels a task renders before it looks for cancellation.
@@ -23,7 +23,10 @@ pub fn render_pass(scene: &PackedScene, film: &mut Film, pass: Pass, cancel: &Ca
     let selected: Vec<bool> = match pass {
         Pass::Main { .. } | Pass::MainRows { .. } => Vec::new(),
         Pass::Real { everywhere } | Pass::RealRows { everywhere, .. } => (0..film.pixels.len())
-            .map(|i| film.needs_real(i) || (everywhere && wants_real(&film.pixels[i])))
+            .map(|i| {
+                let known_edge = scene.pixels[i].flags & PIXEL_EDGE != 0;
+                known_edge || film.needs_real(i) || (everywhere && wants_real(&film.pixels[i]))
+            })
             .collect(),
     };
     let mut no_guides: Vec<GuideSums> = Vec::new();

@@ -70,6 +70,17 @@ impl Film {
         }
     }
 
+    /// Takes all samples back; the plan of samples stays.
+    pub fn clear(&mut self) {
+        for sums in &mut self.pixels {
+            *sums = PixelSums {
+                sample_factor: sums.sample_factor,
+                ..PixelSums::default()
+            };
+        }
+        self.guides.fill(GuideSums::default());
+    }
+
     /// Index of a pixel's first sample in this film.
     pub fn first_index(&self, pixel: usize) -> u32 {
         self.first_sample * self.pixels[pixel].sample_factor.max(1)

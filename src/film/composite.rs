@@ -111,17 +111,18 @@ pub fn background_pixel(sums: &PixelSums, ic: [f32; 3], mode: Composite) -> [f32
     value.as_vec3().to_array()
 }
 
-struct Means {
-    mask: f64,
-    m_im: DVec3,
-    diff: DVec3,
+/// Means over the samples of a pixel.
+pub(super) struct Means {
+    pub mask: f64,
+    pub m_im: DVec3,
+    pub diff: DVec3,
     /// 0 where no real sample was taken.
-    m_ir: DVec3,
-    r_ir: DVec3,
+    pub m_ir: DVec3,
+    pub r_ir: DVec3,
 }
 
 impl Means {
-    fn of(sums: &PixelSums) -> Self {
+    pub fn of(sums: &PixelSums) -> Self {
         let n = f64::from(sums.n.max(1));
         let n_real = f64::from(sums.n_real.max(1));
         Self {

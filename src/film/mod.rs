@@ -3,7 +3,10 @@
 mod accumulation;
 mod compare;
 mod composite;
+mod filter;
 mod flip;
+mod pools;
+mod scrambles;
 mod sums;
 
 pub use accumulation::{Film, MergeError, PixelCounts, PixelKind};
@@ -12,7 +15,10 @@ pub use composite::{
     Picture, Planes, QUOTIENT_EPSILON, background_pixel, composite, estimated_error, planes,
     variance,
 };
+pub use filter::{RealSurface, filter_difference};
 pub use flip::{flip, flip_map};
+pub use pools::pooled;
+pub use scrambles::Scrambles;
 pub use sums::{
     Guide, GuideSums, PixelSums, Sample, Sum3, guide_add, is_unusable, pixel_add, pixel_add_real,
     sum_add, sum3_add, two_sum,

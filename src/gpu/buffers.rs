@@ -128,6 +128,11 @@ impl SceneBuffers {
         true
     }
 
+    /// Replaces the frame by that of `parts`, whose arrays are those that are here.
+    pub fn set_frame(&self, gpu: &GpuDevice, parts: &SceneParts<'_>) {
+        self.write_frame(gpu, &with_bases(parts));
+    }
+
     /// Replaces camera, lens and sampling; the arrays stay.
     fn write_frame(&self, gpu: &GpuDevice, frame: &Frame) {
         gpu.queue

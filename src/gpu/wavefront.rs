@@ -14,7 +14,7 @@ use super::profile::{
 };
 use super::{Changed, Composer, Features, GpuDevice, GpuError, SceneBuffers, SceneParts};
 use crate::film::Film;
-use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
+use crate::packed::{PIXEL_EDGE, PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
 use crate::renderer::{Cancel, Pass, RayTotals};
 
 /// Samples of one pixel in a batch at most, so that a batch has pixels enough to sum in parallel.
@@ -172,6 +172,11 @@ impl GpuBackend {
         Ok(())
     }
 
+    /// Another seed or number of samples of the same scene, which costs next to nothing.
+    pub fn set_frame(&mut self, scene: &PackedScene) {
+        self.scene.set_frame(&self.gpu, &SceneParts::from(scene));
+    }
+
     /// Compiles the kernels for `features` from `composer`'s modules; `scene` is what they read.
     ///
     /// # Errors
@@ -277,7 +282,7 @@ impl GpuBackend {
                 (false, main_work(&scene.pixels, film, &pass))
             }
             Pass::Real { everywhere } | Pass::RealRows { everywhere, .. } => {
-                (true, real_work(film, everywhere, &pass))
+                (true, real_work(&scene.pixels, film, everywhere, &pass))
             }
         };
         if cancel.is_cancelled() {
@@ -559,12 +564,19 @@ pub(super) fn main_work(pixels: &[PixelInfo], film: &Film, pass: &Pass) -> Vec<P
 }
 
 /// The real samples that edge pixels lack; `everywhere`: those of all pixels that are not wholly virtual.
-pub(super) fn real_work(film: &Film, everywhere: bool, pass: &Pass) -> Vec<PixelWork> {
+pub(super) fn real_work(
+    pixels: &[PixelInfo],
+    film: &Film,
+    everywhere: bool,
+    pass: &Pass,
+) -> Vec<PixelWork> {
     film.pixels
         .iter()
         .enumerate()
         .filter(|&(pixel, sums)| {
-            film.needs_real(pixel) || (everywhere && sums.m < sums.n && sums.n_real < sums.n)
+            let known_edge = pixels[pixel].flags & PIXEL_EDGE != 0;
+            sums.n_real < sums.n
+                && (known_edge || film.needs_real(pixel) || (everywhere && sums.m < sums.n))
         })
         .map(|(pixel, sums)| {
             let first = film.first_index(pixel);

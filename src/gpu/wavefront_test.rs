@@ -326,11 +326,11 @@ fn a_pass_asks_for_what_each_pixel_lacks() {
         [work(0, 10..13)]
     );
     assert_eq!(
-        real_work(&film, false, &Pass::Real { everywhere: false }),
+        real_work(&pixels, &film, false, &Pass::Real { everywhere: false }),
         [work(1, 10..13)]
     );
     assert_eq!(
-        real_work(&film, true, &Pass::Real { everywhere: true }),
+        real_work(&pixels, &film, true, &Pass::Real { everywhere: true }),
         [work(1, 10..13), work(2, 10..13)]
     );
 }

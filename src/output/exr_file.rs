@@ -11,7 +11,8 @@ use exr::prelude::{Vec2, attribute::AttributeValue, attribute::Chromaticities};
 use super::target::write_atomically;
 use super::{OutputError, Target};
 use crate::film::{Picture, Planes};
-use crate::scene::{Camera, Estimator, SamplerKind, Scene};
+use crate::renderer::Renderer;
+use crate::scene::{Camera, Estimator, SamplerKind};
 
 /// What the file says about how it was made.
 #[derive(Clone, Debug)]
@@ -22,13 +23,20 @@ pub struct Metadata {
     pub estimator: Estimator,
     pub sampler: SamplerKind,
     pub camera: Camera,
+    /// Independent scrambles that the variance plane is taken from; `None`: it is that of the samples.
+    pub scrambles: Option<u32>,
+    /// The preview filter has smoothed the picture.
+    pub filtered: bool,
 }
 
 impl Metadata {
-    /// `rays_per_pixel` as rendered: less than the scene asks for where the render was ended early.
-    pub fn new(scene: &Scene, rays_per_pixel: u32) -> Self {
+    /// Of a picture as rendered: fewer rays per pixel than the scene asks for where the render was ended early.
+    pub fn of(renderer: &Renderer) -> Self {
+        let scene = renderer.scene();
         Self {
-            rays_per_pixel,
+            rays_per_pixel: renderer.samples(),
+            filtered: renderer.is_filtered(),
+            scrambles: renderer.stated().map(|stated| stated.scrambles),
             max_bounces: scene.settings.max_bounces,
             seed: scene.settings.seed,
             estimator: scene.settings.estimator,
@@ -52,6 +60,15 @@ impl Metadata {
         let camera = &self.camera;
         let rows = camera.world_from_camera.transpose().to_cols_array();
         let distortion = camera.distortion.map(|k| k.to_string()).join(" ");
+        let filter = if self.filtered {
+            "preview: the difference is smoothed, biased"
+        } else {
+            "none"
+        };
+        let variance = match self.scrambles {
+            Some(count) => format!("of the mean of {count} independent scrambles"),
+            None => "of the samples: an upper estimate".to_owned(),
+        };
         [
             ("mixray.version", text(env!("CARGO_PKG_VERSION"))),
             ("mixray.raysPerPixel", number(self.rays_per_pixel)),
@@ -59,6 +76,8 @@ impl Metadata {
             ("mixray.seed", number(self.seed)),
             ("mixray.estimator", text(estimator)),
             ("mixray.sampler", text(sampler)),
+            ("mixray.variance", text(&variance)),
+            ("mixray.filter", text(filter)),
             ("mixray.camera.fx", AttributeValue::F64(camera.fx)),
             ("mixray.camera.fy", AttributeValue::F64(camera.fy)),
             ("mixray.camera.cx", AttributeValue::F64(camera.cx)),
@@ -250,6 +269,8 @@ mod tests {
             seed: u32::MAX,
             estimator: Estimator::Direct,
             sampler: SamplerKind::Sobol,
+            scrambles: Some(16),
+            filtered: true,
             camera: Camera {
                 width: 3,
                 height: 2,
@@ -313,6 +334,10 @@ mod tests {
         let text = |s: &str| AttributeValue::Text(Text::from(s));
         assert_eq!(*attribute("mixray.estimator"), text("direct"));
         assert_eq!(*attribute("mixray.sampler"), text("sobol"));
+        let variance = "of the mean of 16 independent scrambles";
+        assert_eq!(*attribute("mixray.variance"), text(variance));
+        let filter = "preview: the difference is smoothed, biased";
+        assert_eq!(*attribute("mixray.filter"), text(filter));
         assert_eq!(
             *attribute("mixray.version"),
             text(env!("CARGO_PKG_VERSION"))
@@ -346,6 +371,8 @@ mod tests {
             seed: 0,
             estimator: Estimator::Paper,
             sampler: SamplerKind::Cmj,
+            scrambles: None,
+            filtered: false,
             camera: Camera {
                 width: 3,
                 height: 2,

@@ -367,6 +367,8 @@ mod tests {
             seed: 1,
             estimator: Estimator::Paper,
             sampler: SamplerKind::Cmj,
+            scrambles: None,
+            filtered: false,
             camera: Camera {
                 width: 3,
                 height: 2,

@@ -216,6 +216,10 @@ pub const PIXEL_BEAM_MAY_MEET_VIRTUAL: u32 = 1;
 /// The proven bound on the virtual objects' influence is under half an 8-bit code: nothing is traced.
 pub const PIXEL_OUT_OF_REACH: u32 = 2;
 
+/// The pixel is known to be an edge: every sample's real radiance is wanted, even where the film has met one world alone. For backends'
+/// hosts; no shader reads it.
+pub const PIXEL_EDGE: u32 = 4;
+
 /// What the pilot found out about a pixel before any sample is taken.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]

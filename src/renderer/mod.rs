@@ -17,25 +17,35 @@
 //! # }
 //! ```
 
+mod adaptive;
 mod control;
+mod goal;
 mod motion;
 mod photo_albedo;
 mod picture_motion;
+mod series;
 mod skips;
 mod stats;
+mod tiles;
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::DMat4;
 
+pub use adaptive::{SCRAMBLES, Stated};
 pub use control::{Budget, Cancel, Pass, Progress, RayTotals};
+pub use goal::{CameraNoise, ErrorGoal};
 pub use motion::FrameEdit;
 pub use picture_motion::PreviousView;
 pub use skips::{Skip, Without};
 pub use stats::{Stats, StatsRays};
 
 use crate::cpu;
-use crate::film::{Film, MergeError, Picture, Planes, composite, planes};
+use crate::film::{
+    Film, MergeError, Picture, Planes, RealSurface, composite, estimated_error, filter_difference,
+    planes,
+};
 use crate::gpu::{AdapterChoice, Changed, GpuBackend, GpuDevice, GpuError, KernelSeconds};
 use crate::packed::{FRAME_AOVS, Instant, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Side};
@@ -53,6 +63,8 @@ pub struct RendererOptions {
     pub sample_range: Option<(u32, u32)>,
     /// Savings to do without.
     pub without: Without,
+    /// Pictures and planes show the difference on diffuse real surfaces smoothed: for previews, biased. The film is not touched.
+    pub filter: bool,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -97,6 +109,10 @@ pub struct Renderer {
     next_instant: usize,
     /// The picture's time.
     time_secs: f64,
+    /// The error of a film that [`Renderer::render_to_error`] made.
+    stated: Option<Stated>,
+    /// What the preview filter is guided by; empty where it is off.
+    surfaces: Vec<Option<RealSurface>>,
 }
 
 enum Backend {
@@ -139,6 +155,8 @@ impl Renderer {
             instants: Vec::new(),
             next_instant: 0,
             time_secs,
+            stated: None,
+            surfaces: Vec::new(),
         };
         renderer.prepare_photo();
         renderer.prepare_shutter()?;
@@ -152,6 +170,7 @@ impl Renderer {
 
     /// Runs the pilot and begins the film that follows its plan.
     fn look_ahead(&mut self) {
+        self.stated = None;
         cpu::pilot(&mut self.packed);
         self.options.without.apply(&mut self.packed.pixels);
         self.film = Film::new(
@@ -162,6 +181,23 @@ impl Renderer {
         );
         let factors = self.packed.pixels.iter().map(|p| p.sample_factor);
         self.film.set_sample_factors(factors);
+        if self.options.filter {
+            self.surfaces = cpu::diffuse_surfaces(&self.packed);
+        }
+    }
+
+    /// The film as pictures show it.
+    fn shown(&self) -> Cow<'_, Film> {
+        if self.options.filter {
+            Cow::Owned(filter_difference(&self.film, &self.surfaces))
+        } else {
+            Cow::Borrowed(&self.film)
+        }
+    }
+
+    /// Whether the preview filter is on.
+    pub fn is_filtered(&self) -> bool {
+        self.options.filter
     }
 
     fn open_backend(&mut self) -> Result<Backend, RenderError> {
@@ -237,6 +273,9 @@ impl Renderer {
         cancelled: &(dyn Fn() -> bool + Sync),
         progress: &mut dyn FnMut(Progress),
     ) -> Result<(), RenderError> {
+        if self.stated.is_some() {
+            return Ok(());
+        }
         let start = std::time::Instant::now();
         let deadline = match budget {
             Budget::Time(time) => Some(start + time),
@@ -308,7 +347,7 @@ impl Renderer {
         let options = RendererOptions {
             all_planes: !film.guides.is_empty(),
             sample_range: Some((film.first_sample, scene.settings.rays_per_pixel)),
-            without: Without::default(),
+            ..RendererOptions::default()
         };
         let mut renderer = Self::new(scene, options)?;
         renderer.film = film;
@@ -476,7 +515,7 @@ impl Renderer {
             .zip(&self.packed.pixels)
             .filter(|(_, info)| info.flags & PIXEL_OUT_OF_REACH == 0);
         within_reach
-            .map(|(sums, info)| sums.n / info.sample_factor)
+            .map(|(sums, _)| sums.n / sums.sample_factor.max(1))
             .min()
             .unwrap_or(self.end_sample - self.film.first_sample)
     }
@@ -496,14 +535,28 @@ impl Renderer {
     /// The film composited over the photograph.
     pub fn picture(&self) -> Picture {
         composite(
-            &self.film,
+            &self.shown(),
             self.scene.photo.as_ref(),
             self.scene.settings.composite,
         )
     }
 
+    /// The variance plane is that of the scrambles where there are any, else that of the samples.
     pub fn planes(&self) -> Planes {
-        planes(&self.film, self.scene.photo.as_ref())
+        let mut planes = planes(&self.shown(), self.scene.photo.as_ref());
+        if let Some(stated) = &self.stated {
+            planes.variance.clone_from(&stated.variance);
+        }
+        planes
+    }
+
+    /// Root-mean-square error of the picture, linear: from the scrambles where there are any, else from the variance of the samples, which
+    /// overstates that of a stratified sampler.
+    pub fn error(&self) -> f64 {
+        match &self.stated {
+            Some(stated) => stated.rms(),
+            None => estimated_error(&self.film, self.scene.photo.as_ref()),
+        }
     }
 
     pub fn rays(&self) -> RayTotals {

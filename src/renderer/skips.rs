@@ -16,6 +16,8 @@ pub enum Skip {
     EdgeReal,
     /// Shaders hold the code that the scene needs and no more (GPU). The result is the same to rounding.
     Specialisation,
+    /// With a goal, each tile takes the samples that it needs; without, every tile those of the neediest. Both reach the goal.
+    Adaptive,
 }
 
 impl Choice for Skip {
@@ -25,6 +27,7 @@ impl Choice for Skip {
         ("beams", Self::Beams),
         ("edge-real", Self::EdgeReal),
         ("specialisation", Self::Specialisation),
+        ("adaptive", Self::Adaptive),
     ];
 }
 

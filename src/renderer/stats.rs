@@ -10,6 +10,7 @@ pub struct Stats {
     pub seconds: StatsSeconds,
     pub rays: StatsRays,
     pub pixels: PixelCounts,
+    pub error: StatsError,
     /// Samples left out because they were not finite.
     pub non_finite_samples: u64,
     /// "cpu" or "gpu".
@@ -30,6 +31,17 @@ pub struct StatsSeconds {
     pub render: f64,
     /// Composite and files.
     pub write: f64,
+}
+
+/// How good the picture is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct StatsError {
+    /// Root mean square over the picture, linear.
+    pub rms: f64,
+    /// "scrambles": a standard error from independent scrambles; "samples": an upper estimate from the variance of the samples.
+    pub from: String,
+    /// Independent scrambles; 1 where the error is from the samples.
+    pub scrambles: u32,
 }
 
 /// Rays traced, by the paper's kinds. Primary rays are among the mixed and real ones too.
@@ -68,6 +80,15 @@ impl Stats {
                 write: write_secs,
             },
             rays: rays.into(),
+            error: StatsError {
+                rms: renderer.error(),
+                from: match renderer.stated() {
+                    Some(_) => "scrambles",
+                    None => "samples",
+                }
+                .to_owned(),
+                scrambles: renderer.stated().map_or(1, |stated| stated.scrambles),
+            },
             pixels: renderer.film().counts(),
             non_finite_samples: renderer.film().non_finite_samples(),
             backend: renderer.backend_name().to_owned(),
@@ -93,6 +114,7 @@ mod tests {
             seconds: StatsSeconds::default(),
             rays: StatsRays::default(),
             pixels: PixelCounts::default(),
+            error: StatsError::default(),
             non_finite_samples: 0,
             backend: "cpu".into(),
             device: "2 CPU threads".into(),
@@ -109,7 +131,7 @@ mod tests {
         let mut documented: Vec<&str> = "backend device non_finite_samples \
             seconds.load seconds.build seconds.compile seconds.render seconds.write \
             rays.primary rays.mixed rays.real rays.mixed_shadow rays.real_shadow \
-            pixels.background pixels.edge pixels.virtual pixels.skipped"
+            error.rms error.from error.scrambles pixels.background pixels.edge pixels.virtual pixels.skipped"
             .split_whitespace()
             .collect();
         documented.sort_unstable();

@@ -151,6 +151,7 @@ impl Subject {
         settings.composite = method.composite;
         let options = RendererOptions {
             without: method.without.into_iter().collect(),
+            filter: method.filter,
             ..RendererOptions::default()
         };
         let renderer = Renderer::new(scene, options)?;

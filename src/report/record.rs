@@ -64,6 +64,9 @@ pub struct Method {
         with = "by_name_if_any"
     )]
     pub without: Option<Skip>,
+    /// With the preview filter.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub filter: bool,
 }
 
 impl Method {
@@ -79,6 +82,9 @@ impl Method {
         if self.composite != Composite::Additive {
             label += " ";
             label += self.composite.name();
+        }
+        if self.filter {
+            label += " filtered";
         }
         if let Some(skip) = self.without {
             label += " without ";
@@ -231,6 +237,7 @@ pub(super) mod test_support {
             sampler,
             composite: Composite::Additive,
             without: None,
+            filter: false,
         };
         let row = |method, secs: f64, mse: f64| Row {
             scene: "a <b>, \"c\"".into(),

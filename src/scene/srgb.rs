@@ -11,6 +11,15 @@ pub fn decode(encoded: f64) -> f64 {
     }
 }
 
+/// Derivative of [`decode`].
+pub fn decode_slope(encoded: f64) -> f64 {
+    if encoded <= 0.04045 {
+        1.0 / 12.92
+    } else {
+        2.4 / 1.055 * ((encoded + 0.055) / 1.055).powf(1.4)
+    }
+}
+
 /// Encoded value of a linear one, both nominally in 0..=1.
 pub fn encode(linear: f64) -> f64 {
     if linear <= 0.0031308 {

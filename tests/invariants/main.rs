@@ -10,4 +10,5 @@ mod lens;
 mod perfect_proxy;
 mod photograph;
 mod repeatability;
+mod stated_error;
 mod support;

@@ -1,0 +1,318 @@
+//! A filter for previews of a few rays per pixel. Biased: it blurs what the samples cannot tell from noise.
+//!
+//! What virtual objects change on diffuse real surfaces is smooth once divided by the albedo. It is smoothed by the edge-avoiding a-trous
+//! wavelet (Dammertz et al. 2010), guided by the real surface's plane and normal and by the variance (Schied et al. 2017, the spatial part),
+//! and multiplied back. The photograph and virtual surfaces are not touched.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::{Film, PixelSums, Sum3};
+use crate::math::luminance;
+
+/// The real surface that a pixel's rays meet, mean over the lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RealSurface {
+    /// Relative to any point, metres.
+    pub position: Vec3,
+    /// Metres along the view axis.
+    pub depth_m: f32,
+    /// World space, unit.
+    pub normal: Vec3,
+    /// Linear, 0..1.
+    pub albedo: Vec3,
+}
+
+/// Spacing of the taps doubles from 1 pixel; the last level reaches 32.
+const LEVELS: u32 = 5;
+const KERNEL: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
+/// Pixels to either side whose values tell a pixel's variance.
+const NEAR: i32 = 3;
+/// Distance from the surface's plane, relative to its depth, at which a tap has fallen to 1/e.
+const PLANE_TOLERANCE: f32 = 0.01;
+const NORMAL_POWER: i32 = 32;
+/// Standard deviations of brightness at which a tap has fallen to 1/e.
+const DEVIATIONS: f32 = 3.0;
+/// Albedo is taken to be no less.
+const LEAST_ALBEDO: f32 = 0.01;
+/// With fewer samples a pixel's own tell no variance, and its neighbours' spread has to.
+const ENOUGH_SAMPLES: u32 = 4;
+
+/// The film with its difference smoothed where `surfaces` (one a pixel) knows a diffuse real surface and samples met it.
+pub fn filter_difference(film: &Film, surfaces: &[Option<RealSurface>]) -> Film {
+    let canvas = Canvas {
+        width: film.width as i32,
+        height: film.height as i32,
+        surfaces: (film.pixels.iter().zip(surfaces))
+            .map(|(sums, surface)| surface.filter(|_| sums.m < sums.n))
+            .collect(),
+    };
+    let light: Vec<Vec3> = canvas.each(|pixel, surface| {
+        let sums = &film.pixels[pixel];
+        (sums.diff.value() / real_samples(sums)).as_vec3() / divisor(surface)
+    });
+    let own: Vec<f32> =
+        canvas.each(|pixel, surface| own_variance(&film.pixels[pixel], divisor(surface)));
+    let mut variance: Vec<f32> =
+        canvas.each(|pixel, surface| canvas.variance(film, pixel, surface, &light, &own));
+    let mut light = light;
+    for level in 0..LEVELS {
+        let smooth = canvas.blurred(&variance);
+        let both: Vec<(Vec3, f32)> = canvas.each(|pixel, surface| {
+            canvas.level(pixel, surface, 1 << level, &light, &variance, &smooth)
+        });
+        (light, variance) = both.into_iter().unzip();
+    }
+    let mut out = film.clone();
+    out.pixels
+        .par_iter_mut()
+        .zip(&canvas.surfaces)
+        .zip(&light)
+        .for_each(|((sums, surface), light)| {
+            if let Some(surface) = surface {
+                let sum = (*light * divisor(surface)).as_dvec3() * real_samples(sums);
+                sums.diff = Sum3 {
+                    hi: sum.as_vec3().to_array(),
+                    lo: [0.0; 3],
+                };
+            }
+        });
+    out
+}
+
+fn real_samples(sums: &PixelSums) -> f64 {
+    f64::from((sums.n - sums.m).max(1))
+}
+
+fn divisor(surface: &RealSurface) -> Vec3 {
+    surface.albedo.max(Vec3::splat(LEAST_ALBEDO))
+}
+
+/// Variance of the brightness of a pixel's mean, from its own samples; negative where they do not tell.
+fn own_variance(sums: &PixelSums, divisor: Vec3) -> f32 {
+    if sums.n < ENOUGH_SAMPLES || sums.m > 0 {
+        return -1.0;
+    }
+    let n = f64::from(sums.n);
+    let mean = sums.diff.value() / n;
+    let spread = (sums.sq.value() / n - mean * mean).max(DVec3::ZERO) / (n - 1.0);
+    let deviation = luminance(spread.as_vec3().map(f32::sqrt) / divisor);
+    deviation * deviation
+}
+
+/// The pixels that the filter works on.
+struct Canvas {
+    width: i32,
+    height: i32,
+    surfaces: Vec<Option<RealSurface>>,
+}
+
+impl Canvas {
+    /// A value for each pixel; the default where there is nothing to filter.
+    fn each<T: Default + Send>(&self, f: impl Fn(usize, &RealSurface) -> T + Sync) -> Vec<T> {
+        let each = self.surfaces.par_iter().enumerate();
+        each.map(|(pixel, surface)| surface.as_ref().map_or_else(T::default, |s| f(pixel, s)))
+            .collect()
+    }
+
+    /// The pixels this far away that lie on the picture and are filtered too.
+    fn neighbour(&self, pixel: usize, dx: i32, dy: i32) -> Option<(usize, &RealSurface)> {
+        let x = pixel as i32 % self.width + dx;
+        let y = pixel as i32 / self.width + dy;
+        if x < 0 || y < 0 || x >= self.width || y >= self.height {
+            return None;
+        }
+        let at = (y * self.width + x) as usize;
+        Some((at, self.surfaces[at].as_ref()?))
+    }
+
+    /// Variance of a pixel's brightness: the neighbourhood's mean of what samples tell, or its spread where they are too few.
+    fn variance(
+        &self,
+        film: &Film,
+        pixel: usize,
+        surface: &RealSurface,
+        light: &[Vec3],
+        own: &[f32],
+    ) -> f32 {
+        let by_samples = film.pixels[pixel].n >= ENOUGH_SAMPLES;
+        let (mut weights, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for dy in -NEAR..=NEAR {
+            for dx in -NEAR..=NEAR {
+                let Some((at, other)) = self.neighbour(pixel, dx, dy) else {
+                    continue;
+                };
+                if by_samples && own[at] < 0.0 {
+                    continue;
+                }
+                let weight = same_surface(surface, other);
+                let brightness = luminance(light[at]);
+                weights += weight;
+                if by_samples {
+                    sum += weight * own[at];
+                } else {
+                    sum += weight * brightness;
+                    squares += weight * brightness * brightness;
+                }
+            }
+        }
+        if weights <= 0.0 {
+            return 0.0;
+        }
+        let mean = sum / weights;
+        if by_samples {
+            mean
+        } else {
+            (squares / weights - mean * mean).max(0.0)
+        }
+    }
+
+    /// 3 x 3 binomial, so that one pixel's lucky variance does not shut it off.
+    fn blurred(&self, variance: &[f32]) -> Vec<f32> {
+        self.each(|pixel, _| {
+            let (mut weights, mut sum) = (0.0, 0.0);
+            for dy in -1..=1_i32 {
+                for dx in -1..=1_i32 {
+                    if let Some((at, _)) = self.neighbour(pixel, dx, dy) {
+                        let weight = 1.0 / (1 << (dx.abs() + dy.abs())) as f32;
+                        weights += weight;
+                        sum += weight * variance[at];
+                    }
+                }
+            }
+            sum / weights
+        })
+    }
+
+    /// One level of the wavelet: light and its variance.
+    fn level(
+        &self,
+        pixel: usize,
+        surface: &RealSurface,
+        step: i32,
+        light: &[Vec3],
+        variance: &[f32],
+        smooth: &[f32],
+    ) -> (Vec3, f32) {
+        let here = luminance(light[pixel]);
+        let deviation = DEVIATIONS * smooth[pixel].sqrt() + 1e-6;
+        let (mut weights, mut sum, mut spread) = (0.0, Vec3::ZERO, 0.0);
+        for dy in -2..=2_i32 {
+            for dx in -2..=2_i32 {
+                let Some((at, other)) = self.neighbour(pixel, dx * step, dy * step) else {
+                    continue;
+                };
+                let [kx, ky] = [dx, dy].map(|d| KERNEL[d.unsigned_abs() as usize]);
+                let off = (luminance(light[at]) - here).abs() / deviation;
+                let weight = kx * ky * same_surface(surface, other) * (-off).exp();
+                weights += weight;
+                sum += light[at] * weight;
+                spread += variance[at] * weight * weight;
+            }
+        }
+        (sum / weights, spread / (weights * weights))
+    }
+}
+
+/// 1 where both lie in one plane and face the same way, towards 0 elsewhere.
+fn same_surface(a: &RealSurface, b: &RealSurface) -> f32 {
+    let off_plane = a.normal.dot(b.position - a.position).abs();
+    let normal = a.normal.dot(b.normal).max(0.0).powi(NORMAL_POWER);
+    normal * (-off_plane / (PLANE_TOLERANCE * a.depth_m.max(f32::MIN_POSITIVE))).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Sample;
+    use crate::math::{hash_u32, uniform_from_bits};
+
+    const SIDE: usize = 48;
+
+    /// A wall and a floor, chequered; the light on the floor is twice that on the wall.
+    fn surface(pixel: usize) -> RealSurface {
+        let (x, y) = ((pixel % SIDE) as f32, (pixel / SIDE) as f32);
+        let floor = pixel / SIDE >= SIDE / 2;
+        let (position, normal) = if floor {
+            (Vec3::new(x, -24.0, y - 24.0), Vec3::Y)
+        } else {
+            (Vec3::new(x, -y, 0.0), Vec3::Z)
+        };
+        let dark = (pixel % SIDE / 3 + pixel / SIDE / 3).is_multiple_of(2);
+        RealSurface {
+            position,
+            depth_m: 50.0,
+            normal,
+            albedo: Vec3::splat(if dark { 0.2 } else { 0.8 }),
+        }
+    }
+
+    fn truth(pixel: usize) -> f32 {
+        let light = if pixel / SIDE >= SIDE / 2 { -0.2 } else { -0.1 };
+        light * surface(pixel).albedo.x
+    }
+
+    fn film(rays: u32) -> Film {
+        let mut film = Film::new(SIDE as u32, SIDE as u32, 0, false);
+        for pixel in 0..SIDE * SIDE {
+            for ray in 0..rays {
+                let x = uniform_from_bits(hash_u32(pixel as u32 * 977 + ray));
+                film.add(
+                    pixel,
+                    &Sample {
+                        is_virtual: pixel == 100,
+                        contribution: Vec3::splat(2.0 * x * truth(pixel)),
+                        real: None,
+                        guide: None,
+                    },
+                );
+            }
+        }
+        film
+    }
+
+    fn mean_squared_error(film: &Film) -> f64 {
+        let error = |pixel: usize| {
+            let sums = &film.pixels[pixel];
+            sums.diff.value().x / f64::from(sums.n) - f64::from(truth(pixel))
+        };
+        let pixels = (0..SIDE * SIDE).filter(|&pixel| pixel != 100);
+        pixels.map(|pixel| error(pixel).powi(2)).sum::<f64>() / (SIDE * SIDE) as f64
+    }
+
+    /// Against the known light. Control: guides that know neither albedo nor the edge between wall and floor.
+    #[test]
+    fn noise_goes_and_texture_and_edges_stay() {
+        for rays in [1, 8] {
+            let raw = film(rays);
+            let surfaces: Vec<_> = (0..SIDE * SIDE).map(|p| Some(surface(p))).collect();
+            let filtered = mean_squared_error(&filter_difference(&raw, &surfaces));
+            let before = mean_squared_error(&raw);
+            assert!(filtered < 0.1 * before, "{rays} rays: {filtered} {before}");
+            let blind: Vec<_> = (0..SIDE * SIDE)
+                .map(|pixel| {
+                    surfaces[pixel].map(|s| RealSurface {
+                        albedo: Vec3::ONE,
+                        normal: Vec3::Z,
+                        position: Vec3::ZERO,
+                        ..s
+                    })
+                })
+                .collect();
+            let blind = mean_squared_error(&filter_difference(&raw, &blind));
+            assert!(blind > 3.0 * filtered, "control: {blind} {filtered}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_diffuse_real_surface_stays_as_it_is() {
+        let raw = film(2);
+        let some = |pixel: usize| (!pixel.is_multiple_of(7)).then(|| surface(pixel));
+        let filtered = filter_difference(&raw, &(0..SIDE * SIDE).map(some).collect::<Vec<_>>());
+        for pixel in (0..SIDE * SIDE).step_by(7) {
+            assert_eq!(raw.pixels[pixel], filtered.pixels[pixel]);
+        }
+        assert_eq!(raw.pixels[100], filtered.pixels[100], "virtual");
+        assert_ne!(raw.pixels[101], filtered.pixels[101], "control");
+    }
+}
