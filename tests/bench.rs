@@ -443,6 +443,7 @@ fn ranges_merged_equal_one_run() {
         "",
         "--sampler jittered --estimator paper",
         "--composite quotient",
+        "--sampler cmj --no-skip plan",
     ] {
         let folder = Folder::new();
         render_parts(&folder, flags, 16, &[(0, 3), (3, 8), (8, 16)]);
@@ -463,12 +464,33 @@ fn ranges_merged_equal_one_run() {
         let mask = &whole["mask.Y"];
         assert!(mask.iter().any(|m| *m > 0.0 && *m < 1.0), "there are edges");
 
+        folder.refuse(
+            "merge part-0.exr part-1.exr -o part-0.exr",
+            "would be overwritten",
+        );
+        folder.refuse("merge part-0.exr -o photo.png", "would be overwritten");
         // What is merged in part can be merged further.
         folder.succeed("merge part-0.exr part-1.exr -o early.exr");
         folder.succeed("merge early.exr part-2.exr -o late.exr");
         let late = channels(&folder.path("late.exr"));
         assert!(worst_ulp(&whole, &late) <= 2);
     }
+}
+
+#[test]
+fn ranges_of_a_scene_without_virtual_things_merge_too() {
+    let folder = Folder::new();
+    let nothing_virtual = SCENE.split("[[virtual]]").next().unwrap();
+    folder.write("scene.toml", nothing_virtual);
+    for (first, end) in [(0, 3), (3, 8), (8, 16)] {
+        folder.succeed(&format!(
+            "render scene.toml --rpp 16 --range {first}..{end} -o {first}.exr"
+        ));
+    }
+    folder.succeed("merge 0.exr 3.exr -o early.exr");
+    folder.succeed("merge early.exr 8.exr -o whole.exr -o whole.png");
+    let open = |name: &str| image::open(folder.path(name)).unwrap();
+    assert_eq!(open("photo.png"), open("whole.png"));
 }
 
 #[test]

@@ -74,14 +74,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         range.1 = part.note.range.1;
     }
     let total = first.note.total;
-    let renderer = Renderer::with_film(scene, film)?;
+    let renderer = Renderer::with_film(scene, film, range.1)?;
     let complete = range == (0, total);
     write(
         &renderer,
         &targets,
         arguments.png_bits,
         arguments.frame,
-        !complete,
+        (!complete).then_some(range),
     )?;
     let mut out = String::new();
     for target in &targets {

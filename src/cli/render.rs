@@ -246,7 +246,10 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         &targets,
         job.png_bits,
         job.frame,
-        job.range.is_some(),
+        job.range.map(|_| {
+            let first = renderer.film().first_sample;
+            (first, first + renderer.samples())
+        }),
     )?;
     let write_secs = start.elapsed().as_secs_f64();
     let stats = Stats::new(&renderer, load_secs, write_secs);
@@ -264,13 +267,13 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     })
 }
 
-/// `with_film`: EXR files keep the film's sums.
+/// `film_range`: EXR files keep the film's sums, which are of these rays per pixel.
 pub(super) fn write(
     renderer: &Renderer,
     targets: &[Target],
     png_bits: Option<PngBits>,
     frame: u32,
-    with_film: bool,
+    film_range: Option<(u32, u32)>,
 ) -> Result<(), Failure> {
     let gpu = renderer.gpu_device().cloned().map(GpuStages::new);
     let finished = finish(
@@ -303,10 +306,8 @@ pub(super) fn write(
             Format::Exr => {
                 let metadata = Metadata::of(renderer);
                 let planes = renderer.planes();
-                if with_film {
+                if let Some(range) = film_range {
                     let film = renderer.film();
-                    let first = film.first_sample;
-                    let range = (first, first + renderer.samples());
                     let note = FilmNote::new(renderer.scene(), range);
                     write_film(target, &picture, &planes, &metadata, film, &note)?;
                 } else {

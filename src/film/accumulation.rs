@@ -29,6 +29,10 @@ pub enum MergeError {
     Size(u32, u32, u32, u32),
     #[error("one film has depth, normal and albedo planes, the other has none")]
     Guides,
+    #[error(
+        "they were planned differently at pixel {0}: with another --no-skip, or by another kind of machine; render both alike"
+    )]
+    Plan(usize),
     #[error("the sample ranges do not follow one another at pixel {pixel}: {first} and {second}")]
     NotAdjacent {
         pixel: usize,
@@ -173,6 +177,9 @@ impl Film {
         for (pixel, (a, b)) in self.pixels.iter().zip(&other.pixels).enumerate() {
             // A pixel without samples in both films is skipped in the whole render.
             let skipped = a.n == 0 && b.n == 0;
+            if !skipped && a.sample_factor != b.sample_factor {
+                return Err(MergeError::Plan(pixel));
+            }
             if !skipped && self.first_index(pixel) + a.n != other.first_index(pixel) {
                 let range = |film: &Film, n| {
                     let first = film.first_index(pixel);

@@ -8,7 +8,7 @@ use super::channels::ChannelFile;
 use super::exr_file::{Channels, push_channel, write_layers};
 use super::{Metadata, OutputError, Target};
 use crate::film::{Film, GuideSums, Picture, PixelSums, Planes, Sum3};
-use crate::scene::{Choice, Composite, Estimator, Overrides, SamplerKind, Scene};
+use crate::scene::{Choice, Composite, Estimator, Overrides, SamplerKind, Scene, Settings};
 
 /// What a film is a part of: only parts of one render can be put together.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -117,7 +117,7 @@ impl FilmNote {
 
     fn from_texts(text: &dyn Fn(usize) -> Option<String>) -> Option<Self> {
         let number = |i| text(i)?.parse::<u32>().ok();
-        Some(Self {
+        let note = Self {
             version: text(0)?,
             scene: text(1)?,
             fingerprint: text(2)?,
@@ -128,7 +128,10 @@ impl FilmNote {
             estimator: Estimator::from_name(&text(8)?)?,
             sampler: SamplerKind::from_name(&text(9)?)?,
             composite: Composite::from_name(&text(10)?)?,
-        })
+        };
+        let (first, end) = note.range;
+        let is_range = first < end && end <= note.total;
+        (is_range && note.total <= Settings::MAX_RAYS_PER_PIXEL).then_some(note)
     }
 }
 

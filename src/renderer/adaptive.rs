@@ -70,6 +70,9 @@ impl Renderer {
         cancelled: &(dyn Fn() -> bool + Sync),
         progress: &mut dyn FnMut(Progress),
     ) -> Result<(), RenderError> {
+        if !self.instants.is_empty() {
+            return Err(RenderError::MovingGoal);
+        }
         let start = Instant::now();
         if self.stated.is_some() {
             self.look_ahead();

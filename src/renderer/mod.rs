@@ -48,7 +48,9 @@ use crate::film::{
 };
 use crate::gpu::{AdapterChoice, Changed, GpuBackend, GpuDevice, GpuError, KernelSeconds};
 use crate::packed::{FRAME_AOVS, Instant, MATERIAL_PHOTO_ALBEDO, PIXEL_OUT_OF_REACH, PackedScene};
-use crate::scene::{BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Side};
+use crate::scene::{
+    BackendChoice, Composite, Exposure, Lens, Light, LightKind, Scene, Settings, Side,
+};
 
 /// The longest a pass runs before the film is shown, in rays per pixel.
 const MAX_PASS_SAMPLES: u32 = 8;
@@ -75,8 +77,19 @@ pub enum RenderError {
     Gpu(#[from] crate::gpu::GpuError),
     #[error(transparent)]
     Merge(#[from] crate::film::MergeError),
-    #[error("the samples {0}..{1} are not a range of the scene's {2} rays per pixel")]
+    #[error(
+        "the samples {0}..{1} are not a range of the scene's {2} rays per pixel; name others, or more rays per pixel"
+    )]
     SampleRange(u32, u32, u32),
+    #[error(
+        "{0} rays per pixel; expected 1 to {max}; choose another number",
+        max = Settings::MAX_RAYS_PER_PIXEL
+    )]
+    RaysPerPixel(u32),
+    #[error(
+        "objects that move while the shutter is open are not rendered to a stated error; leave out the goal, or [shutter]"
+    )]
+    MovingGoal,
     #[error("there is no object number {0} in the scene")]
     NoSuchObject(usize),
 }
@@ -285,12 +298,13 @@ impl Renderer {
         let total = self.end_sample - first;
         let pixels = u64::from(self.film.width) * u64::from(self.film.height);
         let before = self.samples();
-        let end = match budget {
-            Budget::Rays(rays) => total.min(
-                before + u32::try_from((rays / pixels.max(1)).max(1)).unwrap_or(u32::MAX - before),
-            ),
-            Budget::Complete | Budget::Time(_) => total,
-        };
+        let end =
+            match budget {
+                Budget::Rays(rays) => total.min(before.saturating_add(
+                    u32::try_from((rays / pixels.max(1)).max(1)).unwrap_or(u32::MAX),
+                )),
+                Budget::Complete | Budget::Time(_) => total,
+            };
         if !self.instants.is_empty() && !self.nothing_to_trace() {
             self.advance_in_time(first + end, cancelled, deadline, progress)?;
             self.seconds.render += start.elapsed().as_secs_f64();
@@ -333,12 +347,12 @@ impl Renderer {
         self.replay_real_in_time(everywhere)
     }
 
-    /// A renderer that goes on from the film of an earlier one of the same scene and settings: it stands at the film's last sample, and traces
-    /// what edge pixels lack.
+    /// A renderer that goes on from the film of an earlier one of the same scene and settings: it stands at the film's last sample, which
+    /// comes just before `end` in rays per pixel, and traces what edge pixels lack.
     ///
     /// # Errors
     /// As [`Renderer::new`]; or the film is of another size than the camera.
-    pub fn with_film(scene: Scene, film: Film) -> Result<Self, RenderError> {
+    pub fn with_film(scene: Scene, film: Film, end: u32) -> Result<Self, RenderError> {
         let size = (scene.camera.width, scene.camera.height);
         if (film.width, film.height) != size {
             let sizes = MergeError::Size(film.width, film.height, size.0, size.1);
@@ -346,10 +360,14 @@ impl Renderer {
         }
         let options = RendererOptions {
             all_planes: !film.guides.is_empty(),
-            sample_range: Some((film.first_sample, scene.settings.rays_per_pixel)),
+            sample_range: Some((film.first_sample, end)),
             ..RendererOptions::default()
         };
         let mut renderer = Self::new(scene, options)?;
+        // The film's samples were taken by its own plan: without savings, or on a machine that rounds otherwise, another one than ours.
+        for (info, sums) in renderer.packed.pixels.iter_mut().zip(&film.pixels) {
+            info.sample_factor = sums.sample_factor.max(1);
+        }
         renderer.film = film;
         renderer.replay_real()?;
         Ok(renderer)
@@ -370,8 +388,11 @@ impl Renderer {
     /// Another number of rays per pixel and another seed. Nothing is rebuilt but the pilot; the film starts anew with all samples to render.
     ///
     /// # Errors
-    /// As [`Renderer::set_lens`].
+    /// As [`Renderer::set_lens`]; or the number is 0 or above [`Settings::MAX_RAYS_PER_PIXEL`].
     pub fn set_samples(&mut self, rays_per_pixel: u32, seed: u32) -> Result<(), RenderError> {
+        if !(1..=Settings::MAX_RAYS_PER_PIXEL).contains(&rays_per_pixel) {
+            return Err(RenderError::RaysPerPixel(rays_per_pixel));
+        }
         self.scene.settings.rays_per_pixel = rays_per_pixel;
         self.scene.settings.seed = seed;
         self.packed.frame.rays_total = rays_per_pixel;
