@@ -223,7 +223,12 @@ impl Arguments {
 fn without_each(method: Method) -> impl Iterator<Item = Method> {
     let savings = Skip::CHOICES.iter().map(|(_, skip)| *skip);
     savings
-        .filter(move |skip| *skip != Skip::Specialisation || method.backend == BackendChoice::Gpu)
+        .filter(move |skip| match skip {
+            Skip::Specialisation => method.backend == BackendChoice::Gpu,
+            // It acts where rays are bought by error, and the rows are by rays.
+            Skip::Adaptive => false,
+            _ => true,
+        })
         .map(move |skip| Method {
             without: Some(skip),
             ..method
