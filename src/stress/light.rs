@@ -123,9 +123,15 @@ pub(super) fn one_pixel_sun(backend: &mut Backend, at: At) -> Result<Measured, S
     let sheet = mean(9..15, 2..6) / lit - 1.0;
     let shadow = mean(2..4, 3..5) / -lit - 1.0;
     Ok(Measured {
-        figure: sheet.abs().max(shadow.abs()),
+        figure: worst([sheet.abs(), shadow.abs()]),
         ..Measured::of_film(&shown.film)
     })
+}
+
+/// The largest; not a number if one is not, which `f64::max` would pass over.
+fn worst(figures: impl IntoIterator<Item = f64>) -> f64 {
+    let larger = |a: f64, b: f64| if a.is_nan() || a > b { a } else { b };
+    figures.into_iter().fold(0.0, larger)
 }
 
 /// A black ball over a matt plane under an even sky: the relative error of what it takes, over the whole picture. Control: the ball a
@@ -214,7 +220,7 @@ pub(super) fn many_samples(backend: &mut Backend, at: At) -> Result<Measured, St
         .zip(color)
         .map(|(&is, should)| (f64::from(is) / f64::from(should) - 1.0).abs());
     Ok(Measured {
-        figure: errors.fold(0.0, f64::max),
+        figure: worst(errors),
         ..Measured::of_film(&shown.film)
     })
 }

@@ -45,7 +45,7 @@ fn errors(scene: &Scene, backend: BackendChoice) -> (f64, f64) {
         .as_flattened()
         .iter()
         .map(|&c| (f64::from(c) - 1.0).abs())
-        .fold(0.0, f64::max);
+        .fold(0.0, |a: f64, b| if a.is_nan() || a > b { a } else { b });
     let means: Vec<f64> = picture.linear.iter().map(|&p| grey(p)).collect();
     (worst, mean(&means) - 1.0)
 }
