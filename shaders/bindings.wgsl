@@ -50,6 +50,9 @@ const FRAME_ALPHA: u32 = 4u;
 const FRAME_LIGHTS_SUFFICE: u32 = 8u;
 const FRAME_SHUTTER: u32 = 16u;
 const FRAME_SHUTTER_ORDERED: u32 = 32u;
+const FRAME_BOTH_SHADOWS: u32 = 64u;
+const FRAME_NO_CONES: u32 = 128u;
+const FRAME_NO_LAST_VERTEX: u32 = 256u;
 
 struct Vertex {
     position_u0: vec4<f32>,

@@ -217,7 +217,7 @@ fn resume(st: ptr<function, PathState>) {
                 (*st).depth = (*st).difference_depth;
                 (*st).t_max = FAR;
                 (*st).stage = STAGE_DIFFERENCE_BSDF;
-                (*st).request = select(REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, (*st).difference_lambertian != 0u);
+                (*st).request = select(REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, (*st).difference_left_to_cones != 0u);
                 return;
             }
         }
@@ -305,7 +305,7 @@ fn difference_cone(st: ptr<function, PathState>) {
 
 fn difference_bsdf(st: ptr<function, PathState>) {
     if virtual_is_nearer((*st).hit_virtual, (*st).hit_real) {
-        if (*st).difference_lambertian == 0u {
+        if (*st).difference_left_to_cones == 0u {
             if (*st).density != DELTA_DENSITY {
                 let total = (*st).density + vertex_cone_density(st);
                 (*st).throughput *= (*st).density / total;
@@ -324,6 +324,7 @@ fn difference_bsdf(st: ptr<function, PathState>) {
 }
 
 fn vertex_cone_density(st: ptr<function, PathState>) -> f32 {
+    if (*st).difference_cone_probability == 0.0 { return 0.0; }
     return (*st).difference_cone_probability * cone_pdf((*st).position, (*st).difference_normal, (*st).direction);
 }
 

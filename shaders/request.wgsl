@@ -1,6 +1,6 @@
 // Answers a sample's ray request. Rust twin: src/cpu/trace.rs.
 
-import package::bindings::{NONE, frame, materials, triangles, MATERIAL_ALPHA_MASK, MATERIAL_ALPHA_BLEND};
+import package::bindings::{NONE, frame, materials, triangles, FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_MASK, MATERIAL_ALPHA_BLEND};
 import package::math::{dot3, hash_combine, length3, uniform_from_bits};
 import package::state::{
     COINCIDENCE, FAR, PathState, miss,
@@ -66,7 +66,7 @@ fn next_query(request: u32, step: u32, t_max: f32, hit_real: Hit, hit_virtual: H
         }
         case REQUEST_SHADOW_DIFFERENCE: {
             if step == 0u { return query(WORLD_VIRTUAL, true, t_max); }
-            if step == 1u && met_virtual { return query(WORLD_REAL, true, t_max); }
+            if step == 1u && (met_virtual || asks_both()) { return query(WORLD_REAL, true, t_max); }
         }
         case REQUEST_SHADOW_PAIR: {
             if step == 0u { return query(WORLD_REAL, true, t_max); }
@@ -76,6 +76,10 @@ fn next_query(request: u32, step: u32, t_max: f32, hit_real: Hit, hit_virtual: H
         default: {}
     }
     return none;
+}
+
+fn asks_both() -> bool {
+    return (frame.flags & FRAME_BOTH_SHADOWS) != 0u;
 }
 
 fn count_rays(st: ptr<function, PathState>, met_real: bool, met_virtual: bool) {
@@ -94,7 +98,7 @@ fn count_rays(st: ptr<function, PathState>, met_real: bool, met_virtual: bool) {
         case REQUEST_SHADOW_REAL: { (*st).rays.real_shadow += 1u; }
         case REQUEST_SHADOW_DIFFERENCE: {
             (*st).rays.mixed_shadow += 1u;
-            (*st).rays.real_shadow += u32(met_virtual);
+            (*st).rays.real_shadow += u32(met_virtual || asks_both());
         }
         case REQUEST_SHADOW_PAIR: {
             (*st).rays.real_shadow += 1u;

@@ -97,7 +97,7 @@ struct PathState {
     shadow_request: u32,
     real_depth: u32,
     difference_depth: u32,
-    difference_lambertian: u32,
+    difference_left_to_cones: u32,
     next_medium: u32,
     real_medium: u32,
     difference_medium: u32,

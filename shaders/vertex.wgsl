@@ -1,6 +1,9 @@
 // One vertex of any path: emission, next event, cone direction, continuation. Rust twin: src/cpu/vertex.rs.
 
-import package::bindings::{NONE, frame, materials, FRAME_LIGHTS_SUFFICE, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT};
+import package::bindings::{
+    NONE, frame, materials, FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT,
+    MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
+};
 import package::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample};
 import package::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
 import package::contribution::{accumulate, density_weight, draw};
@@ -72,7 +75,9 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
 
     var roulette = Roulette(1.0, 1.0);
     @if(!paper) {
-        if difference {
+        if difference && (frame.flags & FRAME_NO_CONES) != 0u {
+            roulette.cone = 0.0;
+        } else if difference {
             let strength = max_element(abs((*st).throughput * bsdf_albedo(s, wo)));
             let reach = cone_solid_angle_fraction(s.position, s.ns);
             roulette.cone = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
@@ -94,8 +99,14 @@ fn lights_suffice(st: ptr<function, PathState>, s: Surface) -> bool {
         return false;
     }
     @else {
-        return (*st).depth >= frame.max_bounces && (frame.flags & FRAME_LIGHTS_SUFFICE) != 0u && bsdf_is_lambertian(s);
+        return (*st).depth >= frame.max_bounces
+            && (frame.flags & (FRAME_LIGHTS_SUFFICE | FRAME_NO_LAST_VERTEX)) == FRAME_LIGHTS_SUFFICE
+            && bsdf_is_lambertian(s);
     }
+}
+
+fn left_to_cones(s: Surface) -> bool {
+    return bsdf_is_lambertian(s) && (frame.flags & FRAME_NO_CONES) == 0u;
 }
 
 fn coincides(st: ptr<function, PathState>, s: Surface, distance: f32) -> bool {
@@ -135,7 +146,8 @@ fn light_contribution(
     let real_light = l.side == 0u;
     if l.pdf <= 0.0 || ((*st).mode == MODE_REAL && !real_light) { return vec3<f32>(0.0); }
     @if(!paper) {
-        if difference && real_light && !direction_meets_spheres(s.position, l.direction) { return vec3<f32>(0.0); }
+        let asks_both = (frame.flags & FRAME_BOTH_SHADOWS) != 0u;
+        if difference && real_light && !asks_both && !direction_meets_spheres(s.position, l.direction) { return vec3<f32>(0.0); }
     }
     let f = bsdf_eval(s, wo, l.direction);
     if max_element(f.f_cos) <= 0.0 { return vec3<f32>(0.0); }
@@ -144,8 +156,9 @@ fn light_contribution(
         var other = f.pdf;
         @if(!paper) {
             if difference {
-                other = roulette.cone * cone_pdf(s.position, s.ns, l.direction);
-                if !bsdf_is_lambertian(s) { other += f.pdf; }
+                other = 0.0;
+                if roulette.cone > 0.0 { other = roulette.cone * cone_pdf(s.position, s.ns, l.direction); }
+                if !left_to_cones(s) { other += f.pdf; }
             }
         }
         weight = density_weight(l.pdf, other);
@@ -198,7 +211,7 @@ fn medium_along(st: ptr<function, PathState>, s: Surface, direction: vec3<f32>) 
 
 fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
     let difference = is_difference(st);
-    if difference && bsdf_is_lambertian(s) && (*st).depth >= frame.max_bounces { return; }
+    if difference && left_to_cones(s) && (*st).depth >= frame.max_bounces { return; }
     let u = draw(st, select(SET_PATH_BSDF, SET_DIFFERENCE_BSDF, difference));
     if u.w >= roulette.bsdf { return; }
     let b = bsdf_sample(s, wo, u.xyz);
@@ -214,7 +227,7 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, ro
             (*st).difference_t_min = (*st).real_t_min;
             (*st).difference_depth = (*st).depth;
             (*st).difference_direction = b.wi;
-            (*st).difference_lambertian = u32(bsdf_is_lambertian(s));
+            (*st).difference_left_to_cones = u32(left_to_cones(s));
             (*st).difference_normal = s.ns;
             (*st).difference_cone_probability = roulette.cone;
             (*st).difference_density = select(b.pdf, DELTA_DENSITY, b.delta);

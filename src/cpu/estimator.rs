@@ -257,7 +257,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.depth = st.difference_depth;
             st.t_max = f32::INFINITY;
             st.stage = STAGE_DIFFERENCE_BSDF;
-            st.request = if st.difference_lambertian {
+            st.request = if st.difference_left_to_cones {
                 REQUEST_REAL_UNLESS_COVERED
             } else {
                 REQUEST_CLOSEST_EACH
@@ -372,7 +372,7 @@ fn difference_cone(scene: &PackedScene, st: &mut PathState) {
 /// A direction drawn from the BSDF: the recursion where real geometry is nearer, the other half of (b) where virtual geometry is.
 fn difference_bsdf(scene: &PackedScene, st: &mut PathState) {
     if virtual_is_nearer(st.hit_virtual, st.hit_real) {
-        if !st.difference_lambertian {
+        if !st.difference_left_to_cones {
             if st.density != DELTA_DENSITY {
                 // The cones could have drawn it too: the balance heuristic divides by the sum.
                 let total = st.density + vertex_cone_density(scene, st);
@@ -389,6 +389,9 @@ fn difference_bsdf(scene: &PackedScene, st: &mut PathState) {
 
 /// Effective density of the cone technique at the vertex that the present ray leaves.
 fn vertex_cone_density(scene: &PackedScene, st: &PathState) -> f32 {
+    if st.difference_cone_probability == 0.0 {
+        return 0.0;
+    }
     st.difference_cone_probability
         * cone_pdf(
             &Cones::at(&scene.frame, st.position, st.difference_normal),

@@ -157,8 +157,8 @@ pub struct PathState {
     pub difference_density: f32,
     pub difference_throughput: Vec3,
     pub difference_medium: u32,
-    /// The vertex is Lambertian: what the cones cover is left to them.
-    pub difference_lambertian: bool,
+    /// What the cones of that vertex cover is left to them.
+    pub difference_left_to_cones: bool,
     /// Shading normal and roulette probability of the cones at that vertex, to weigh a BSDF direction against them.
     pub difference_normal: Vec3,
     pub difference_cone_probability: f32,
@@ -225,7 +225,7 @@ impl PathState {
             difference_density: 0.0,
             difference_throughput: Vec3::ZERO,
             difference_medium: NONE,
-            difference_lambertian: false,
+            difference_left_to_cones: false,
             difference_normal: Vec3::ZERO,
             difference_cone_probability: 0.0,
             mask: 0,

@@ -4,7 +4,9 @@ use super::state::*;
 use crate::accel::{Hit, Ray};
 use crate::material::surface_alpha;
 use crate::math::{hash_combine, length3, uniform_from_bits};
-use crate::packed::{FRAME_ALPHA, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, NONE, PackedScene};
+use crate::packed::{
+    FRAME_ALPHA, FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, NONE, PackedScene,
+};
 
 /// A ray that meets this many transparent layers ends at the last.
 const MAX_ALPHA_LAYERS: u32 = 64;
@@ -69,7 +71,7 @@ pub fn answer(scene: &PackedScene, st: &mut PathState) {
         REQUEST_SHADOW_DIFFERENCE => {
             st.rays.mixed_shadow += 1;
             hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, t_max, true);
-            if hit_virtual.triangle != NONE {
+            if hit_virtual.triangle != NONE || scene.frame.flags & FRAME_BOTH_SHADOWS != 0 {
                 st.rays.real_shadow += 1;
                 hit_real = trace_world(scene, st, WORLD_REAL, t_max, true);
             }

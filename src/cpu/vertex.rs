@@ -13,8 +13,8 @@ use crate::material::{
 };
 use crate::math::{dot3, exp_, safe_sqrt};
 use crate::packed::{
-    FRAME_LIGHTS_SUFFICE, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE,
-    PackedScene,
+    FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX,
+    MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE, PackedScene,
 };
 
 /// Paths shorter than this are never ended by roulette.
@@ -97,12 +97,24 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
 /// the rays of its rules all the same.)
 fn lights_suffice(scene: &PackedScene, st: &PathState, s: &Surface) -> bool {
     st.depth >= scene.frame.max_bounces
-        && scene.frame.flags & FRAME_LIGHTS_SUFFICE != 0
+        && scene.frame.flags & (FRAME_LIGHTS_SUFFICE | FRAME_NO_LAST_VERTEX) == FRAME_LIGHTS_SUFFICE
         && scene.frame.estimator != ESTIMATOR_PAPER
         && bsdf_is_lambertian(s)
 }
 
+/// What the cones cover is left to them: a Lambertian surface has no direction that the BSDF draws better.
+fn left_to_cones(scene: &PackedScene, s: &Surface) -> bool {
+    bsdf_is_lambertian(s) && scene.frame.flags & FRAME_NO_CONES == 0
+}
+
 fn techniques_at(scene: &PackedScene, st: &PathState, s: &Surface, wo: Vec3) -> Techniques {
+    if scene.frame.flags & FRAME_NO_CONES != 0 {
+        return Techniques {
+            cones: Cones::none(s.ns),
+            cone_probability: 0.0,
+            bsdf_probability: 1.0,
+        };
+    }
     let cones = Cones::at(&scene.frame, s.position, s.ns);
     let strength = (st.throughput * bsdf_albedo(s, wo)).abs().max_element();
     let reach = cone_solid_angle_fraction(&cones);
@@ -187,7 +199,11 @@ fn light_contribution(
     if l.pdf <= 0.0 || (st.mode == MODE_REAL && !real_light) {
         return Vec3::ZERO;
     }
-    if difference && real_light && !direction_meets_spheres(&scene.frame, s.position, l.direction) {
+    if difference
+        && real_light
+        && scene.frame.flags & FRAME_BOTH_SHADOWS == 0
+        && !direction_meets_spheres(&scene.frame, s.position, l.direction)
+    {
         return Vec3::ZERO;
     }
     let f = bsdf_eval(s, wo, l.direction);
@@ -199,7 +215,7 @@ fn light_contribution(
         let mut other = f.pdf;
         if let Some(t) = techniques {
             other = t.cone_probability * cone_pdf(&t.cones, l.direction);
-            if !bsdf_is_lambertian(s) {
+            if !left_to_cones(scene, s) {
                 other += f.pdf;
             }
         }
@@ -275,7 +291,7 @@ fn plan_continuation(
     techniques: Option<&Techniques>,
 ) {
     let difference = techniques.is_some();
-    if difference && bsdf_is_lambertian(s) && st.depth >= scene.frame.max_bounces {
+    if difference && left_to_cones(scene, s) && st.depth >= scene.frame.max_bounces {
         return;
     }
     let u = draw(
@@ -304,7 +320,7 @@ fn plan_continuation(
         st.difference_t_min = st.real_t_min;
         st.difference_depth = st.depth;
         st.difference_direction = b.wi;
-        st.difference_lambertian = bsdf_is_lambertian(s);
+        st.difference_left_to_cones = left_to_cones(scene, s);
         st.difference_normal = s.ns;
         st.difference_cone_probability = t.cone_probability;
         st.difference_density = if b.delta { DELTA_DENSITY } else { b.pdf };

@@ -90,17 +90,23 @@ pub struct Cones {
 impl Cones {
     /// Seen from `position` on a surface with the unit shading normal `ns`.
     pub fn at(frame: &Frame, position: Vec3, ns: Vec3) -> Self {
-        let mut seen = Self {
-            cones: [UNSEEN; MAX_SPHERES],
-            count: frame.sphere_count as usize,
-            total: 0.0,
-            ns,
-        };
+        let mut seen = Self::none(ns);
+        seen.count = frame.sphere_count as usize;
         for i in 0..seen.count {
             seen.cones[i] = cone_of(frame, i as u32, position, ns);
             seen.total += seen.cones[i].weight;
         }
         seen
+    }
+
+    /// Without anything virtual in sight.
+    pub fn none(ns: Vec3) -> Self {
+        Self {
+            cones: [UNSEEN; MAX_SPHERES],
+            count: 0,
+            total: 0.0,
+            ns,
+        }
     }
 
     fn seen(&self) -> &[Cone] {

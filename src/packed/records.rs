@@ -83,6 +83,12 @@ pub const FRAME_LIGHTS_SUFFICE: u32 = 8;
 pub const FRAME_SHUTTER: u32 = 16;
 /// A pixel's samples follow one another in time.
 pub const FRAME_SHUTTER_ORDERED: u32 = 32;
+/// Without the saving `virtual-first`: every light sample of a difference asks both worlds.
+pub const FRAME_BOTH_SHADOWS: u32 = 64;
+/// Without the saving `cones`: the BSDF alone looks for virtual geometry.
+pub const FRAME_NO_CONES: u32 = 128;
+/// Without the saving `last-vertex`: every last vertex looks for light, as if `FRAME_LIGHTS_SUFFICE` were not.
+pub const FRAME_NO_LAST_VERTEX: u32 = 256;
 
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -74,6 +74,11 @@ impl Renderer {
             return Err(RenderError::MovingGoal);
         }
         let start = Instant::now();
+        let stops_at_noise = !self.options.without.contains(Skip::CameraNoise);
+        let goal = &ErrorGoal {
+            noise: goal.noise.filter(|_| stops_at_noise),
+            ..*goal
+        };
         if self.stated.is_some() {
             self.look_ahead();
         }
@@ -111,6 +116,11 @@ impl Renderer {
                 .collect()
         };
         let all: Rc<[bool]> = vec![true; tiles.count()].into();
+        if run.goal.takes_all_rays() {
+            run.expected = SCRAMBLES;
+            self.plan(scaled(&vec![f64::from(most); tiles.count()]))?;
+            return self.series(0, SCRAMBLES, &all, tiles, run);
+        }
 
         let even = vec![1.0; tiles.count()];
         self.plan(scaled(&even))?;

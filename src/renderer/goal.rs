@@ -20,7 +20,8 @@ impl CameraNoise {
     }
 }
 
-/// When a tile of the picture is good enough. Where both are given, what either allows is enough.
+/// When a tile of the picture is good enough. Where both are given, what either allows is enough; where neither is, no tile is before its rays
+/// are spent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorGoal {
     /// Root mean square standard error of the composite, linear, over a tile's pixels and channels.
@@ -35,8 +36,16 @@ impl ErrorGoal {
     /// Rays per pixel after which a pixel is left as it is, unless the caller says otherwise.
     pub const DEFAULT_MAX_RAYS_PER_PIXEL: u32 = 1 << 14;
 
+    /// There is nothing to aim at: all rays are taken.
+    pub(super) fn takes_all_rays(&self) -> bool {
+        self.standard_error.is_none() && self.noise.is_none()
+    }
+
     /// Variance that is allowed at a pixel of this colour, linear.
     pub(super) fn allowed_variance(&self, linear: [f32; 3]) -> DVec3 {
+        if self.takes_all_rays() {
+            return DVec3::INFINITY;
+        }
         let even = self.standard_error.map_or(0.0, |e| e * e);
         DVec3::from(std::array::from_fn::<f64, 3, _>(|c| {
             let noise = |n: &CameraNoise| n.linear_variance(c, f64::from(linear[c]));

@@ -184,8 +184,10 @@ impl Renderer {
     /// Runs the pilot and begins the film that follows its plan.
     fn look_ahead(&mut self) {
         self.stated = None;
+        let without = self.options.without;
+        without.apply_to_frame(&mut self.packed.frame);
         cpu::pilot(&mut self.packed);
-        self.options.without.apply(&mut self.packed.pixels);
+        without.apply_to_pixels(&mut self.packed.pixels);
         self.film = Film::new(
             self.film.width,
             self.film.height,

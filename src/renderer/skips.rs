@@ -1,6 +1,9 @@
 //! The savings that can be switched off, to measure what each is worth.
 
-use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PixelInfo};
+use crate::packed::{
+    FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL,
+    PIXEL_OUT_OF_REACH, PixelInfo,
+};
 use crate::scene::Choice;
 
 /// Work that is left out because it cannot matter, or seldom does.
@@ -14,10 +17,21 @@ pub enum Skip {
     Beams,
     /// The real ray behind a virtual hit is traced in edge pixels alone. Proven: the result is the same.
     EdgeReal,
+    /// A light sample of the difference asks the virtual world first, its bounding spheres before its triangles, and the real one only where
+    /// something virtual blocks. Proven: the result is the same.
+    VirtualFirst,
+    /// Directions inside the cones of the virtual bounding spheres; without them the BSDF's alone find virtual objects. The expectation is the
+    /// same.
+    Cones,
+    /// Where a few lights are all the light there is, a diffuse last vertex leaves all to its shadow ray. The expectation is the same.
+    LastVertex,
     /// Shaders hold the code that the scene needs and no more (GPU). The result is the same to rounding.
     Specialisation,
     /// With a goal, each tile takes the samples that it needs; without, every tile those of the neediest. Both reach the goal.
     Adaptive,
+    /// With that goal, a tile stops where its variance is down to the camera's noise; without, only where its rays are spent or another goal is
+    /// met. The expectation is the same.
+    CameraNoise,
 }
 
 impl Choice for Skip {
@@ -26,22 +40,39 @@ impl Choice for Skip {
         ("plan", Self::Plan),
         ("beams", Self::Beams),
         ("edge-real", Self::EdgeReal),
+        ("virtual-first", Self::VirtualFirst),
+        ("cones", Self::Cones),
+        ("last-vertex", Self::LastVertex),
         ("specialisation", Self::Specialisation),
         ("adaptive", Self::Adaptive),
+        ("camera-noise", Self::CameraNoise),
     ];
 }
 
 /// Savings that are switched off; none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Without(u8);
+pub struct Without(u16);
 
 impl Without {
     pub fn contains(self, skip: Skip) -> bool {
         self.0 & bit(skip) != 0
     }
 
+    /// Takes the estimator's share of the savings back.
+    pub(super) fn apply_to_frame(self, frame: &mut Frame) {
+        for (skip, flag) in [
+            (Skip::VirtualFirst, FRAME_BOTH_SHADOWS),
+            (Skip::Cones, FRAME_NO_CONES),
+            (Skip::LastVertex, FRAME_NO_LAST_VERTEX),
+        ] {
+            if self.contains(skip) {
+                frame.flags |= flag;
+            }
+        }
+    }
+
     /// Takes the pixels' share of the savings back.
-    pub(super) fn apply(self, pixels: &mut [PixelInfo]) {
+    pub(super) fn apply_to_pixels(self, pixels: &mut [PixelInfo]) {
         if self == Self::default() {
             return;
         }
@@ -65,7 +96,7 @@ impl FromIterator<Skip> for Without {
     }
 }
 
-fn bit(skip: Skip) -> u8 {
+fn bit(skip: Skip) -> u16 {
     1 << skip as u8
 }
 
@@ -86,11 +117,11 @@ mod tests {
                 .iter()
                 .copied()
                 .collect::<Without>()
-                .apply(&mut pixels);
+                .apply_to_pixels(&mut pixels);
             pixels[0]
         };
         assert_eq!(after(&[]), pixel);
-        assert_eq!(after(&[Skip::EdgeReal, Skip::Specialisation]), pixel);
+        assert_eq!(after(&[Skip::EdgeReal, Skip::Cones]), pixel);
         assert_eq!(after(&[Skip::Plan]), PixelInfo::uniform(pixel.flags));
         assert_eq!(after(&[Skip::OutOfReach]).flags, 0);
         assert_eq!(after(&[Skip::Beams]), pixel, "no ray, no beam");

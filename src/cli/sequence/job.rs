@@ -14,7 +14,7 @@ use crate::cli::{Failure, Outcome, interrupt, print, say};
 use crate::gpu::GpuStages;
 use crate::output::{check_writable, write_text};
 use crate::packed::next_anchor;
-use crate::renderer::{Budget, FrameEdit, PreviousView, RayTotals, Renderer, RendererOptions};
+use crate::renderer::{Budget, FrameEdit, PreviousView, RayTotals, Renderer, RendererOptions, Without};
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{Camera, Exposure, Lens, MotionBlurMethod, Scene, fingerprint_of};
 use crate::stages::{Finished, finish};
@@ -218,7 +218,11 @@ impl Sequence<'_> {
             // Fitted once, to the first posed frame of the range, whether or not that one is finished.
             scene.photo = Some(frame.photo.clone());
             scene.camera = camera.clone();
-            let renderer = Renderer::new(scene, RendererOptions::default())?;
+            let options = RendererOptions {
+                without: self.arguments.no_skip.iter().copied().collect(),
+                ..RendererOptions::default()
+            };
+            let renderer = Renderer::new(scene, options)?;
             let seconds = renderer.seconds();
             self.seconds.compile += seconds.compile;
             self.seconds.first_build += begin.elapsed().as_secs_f64() - seconds.compile;
@@ -313,11 +317,12 @@ impl Sequence<'_> {
             "{:?} {:?} {:?} {:?}",
             poses.entries, poses.intrinsics, self.files.intrinsics, self.rate
         );
+        let without: Without = arguments.no_skip.iter().copied().collect();
         let fingerprint = fingerprint_of([
             env!("CARGO_PKG_VERSION"),
             &scene.fingerprint(),
             &format!(
-                "{:?} {:?} {:?}",
+                "{:?} {:?} {:?} {without:?}",
                 scene.settings, scene.stages, arguments.png_bits
             ),
             &trajectory,

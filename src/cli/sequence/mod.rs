@@ -13,6 +13,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use super::render::{choice, png_bits};
 use super::{Failure, Outcome};
 use crate::output::PngBits;
+use crate::renderer::Skip;
 use crate::scene::{BackendChoice, Composite, Estimator, Overrides, SamplerKind, Settings};
 
 /// Renders a scene's virtual objects into the frames of a video
@@ -73,6 +74,9 @@ pub(super) struct Arguments {
     /// Surface interactions before the light; 1 is direct light only
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_BOUNCES)))]
     max_bounces: Option<u32>,
+    /// Do without a saving, to see what it is worth; may be given several times
+    #[arg(long, value_name = "NAME", value_parser = choice::<Skip>())]
+    no_skip: Vec<Skip>,
     /// Bits a channel of PNG frames [default: 16 for 16-bit frames, else 8]
     #[arg(long, value_parser = PossibleValuesParser::new(["8", "16"]).map(png_bits))]
     png_bits: Option<PngBits>,

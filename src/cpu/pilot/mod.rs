@@ -19,7 +19,7 @@ use importance::{PilotLights, importance};
 
 use super::contribution::ESTIMATOR_PAPER;
 use crate::packed::{
-    FRAME_AOVS, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene, PixelInfo,
+    FRAME_AOVS, FRAME_BOTH_SHADOWS, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene, PixelInfo,
 };
 
 /// Fewer rays per pixel than this are not worth a measurement.
@@ -102,7 +102,8 @@ fn measure(
     } else {
         SEED
     };
-    scene.frame.flags &= !FRAME_AOVS;
+    // Neither planes nor needless rays shall show in the plan.
+    scene.frame.flags &= !(FRAME_AOVS | FRAME_BOTH_SHADOWS);
     scene.pixels = flags.iter().copied().map(PixelInfo::uniform).collect();
     let measured = measurement::measure(scene, blocks);
     scene.frame = frame;
