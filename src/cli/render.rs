@@ -327,7 +327,7 @@ pub(super) fn above_zero(text: &str) -> Result<f64, &'static str> {
 }
 
 /// "0.01,0.2", or the name of a file.
-fn camera_noise(text: &str) -> Result<CameraNoise, Failure> {
+pub(super) fn camera_noise(text: &str) -> Result<CameraNoise, Failure> {
     let parse = |part: &str| part.trim().parse::<f64>().ok();
     let numbers: Option<Vec<f64>> = text.split(',').map(parse).collect();
     match numbers.as_deref() {

@@ -22,6 +22,22 @@ pub struct Plan {
     pub hardware_gpu: bool,
 }
 
+impl Plan {
+    /// Numbers of rays at which a method is measured: with a goal, that is one.
+    fn levels(&self, method: &Method) -> usize {
+        match method.goal {
+            Some(_) => 1,
+            None => self.rays_per_pixel.len(),
+        }
+    }
+
+    /// Renders that [`measure`] makes of a scene.
+    pub fn runs(&self) -> u64 {
+        let of = |method| 1 + u64::from(self.repeats) * self.levels(method) as u64;
+        self.methods.iter().map(of).sum()
+    }
+}
+
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     #[error(transparent)]
@@ -41,7 +57,7 @@ pub struct Shot {
     pub picture: Picture,
 }
 
-/// Renders every method at every number of rays, all of them once before any of them again, after one untimed run of each method at the
+/// Renders every method at every number of rays, or once to its goal, all of them once before any of them again, after one untimed run of each method at the
 /// fewest rays. `truth` gives the reference for a method, without which its errors stay 0; `tick` hears what is about to be rendered. Once `cancelled` says so, what is
 /// complete is returned.
 ///
@@ -66,7 +82,7 @@ pub fn measure<'a>(
         tick(&format!("{}: {}, warm-up", scene.name, method.label()));
         let mut subject = Subject::new(scene, *method)?;
         let fewest = plan.rays_per_pixel.first().copied().unwrap_or(1);
-        subject.render(fewest, plan.first_seed, cancelled)?;
+        subject.run(Some(fewest), plan.first_seed, cancelled)?;
         subject.check_backend()?;
         subjects.push(subject);
     }
@@ -81,13 +97,18 @@ pub fn measure<'a>(
             for turn in 0..subjects.len() {
                 // Another method begins in every repetition.
                 let at = (turn + repeat as usize) % subjects.len();
+                if level >= plan.levels(&plan.methods[at]) {
+                    continue;
+                }
                 let subject = &mut subjects[at];
+                let rays_per_pixel = subject.limit().unwrap_or(rays_per_pixel);
                 tick(&format!(
                     "{}: {}, {rays_per_pixel} rays per pixel",
                     scene.name,
                     subject.method.label()
                 ));
-                let (mut sample, picture) = subject.render(rays_per_pixel, seed, cancelled)?;
+                let given = subject.method.goal.is_none().then_some(rays_per_pixel);
+                let (mut sample, picture) = subject.run(given, seed, cancelled)?;
                 if cancelled() {
                     break 'runs;
                 }
@@ -96,7 +117,8 @@ pub fn measure<'a>(
                     sample.errors = Errors::of(&picture, truth);
                 }
                 cells[level * plan.methods.len() + at].push(sample);
-                if repeat == 0 && shown.contains(&level) {
+                let is_shown = shown.contains(&level) || subject.method.goal.is_some();
+                if repeat == 0 && is_shown {
                     shots.push(Shot {
                         scene: scene.name.clone(),
                         method: subject.method,
@@ -113,11 +135,39 @@ pub fn measure<'a>(
         for (level, &rays_per_pixel) in plan.rays_per_pixel.iter().enumerate() {
             let samples = &cells[level * subjects.len() + at];
             if !samples.is_empty() {
+                let rays_per_pixel = subject.limit().unwrap_or(rays_per_pixel);
                 rows.push(subject.row(rays_per_pixel, samples, plan.hardware_gpu));
             }
         }
     }
     Ok((rows, shots))
+}
+
+/// RMSE of one run of a method.
+///
+/// # Errors
+/// As [`measure`].
+pub fn rmse_of(
+    scene: &Scene,
+    method: Method,
+    rays_per_pixel: u32,
+    seed: u32,
+    truth: &Truth,
+    cancelled: &(dyn Fn() -> bool + Sync),
+) -> Result<f64, MeasureError> {
+    let mut subject = Subject::new(scene, method)?;
+    let (_, picture) = subject.run(Some(rays_per_pixel), seed, cancelled)?;
+    check_size(&picture, truth)?;
+    Ok(Errors::of(&picture, truth).all.rmse)
+}
+
+fn check_size(picture: &Picture, truth: &Truth) -> Result<(), MeasureError> {
+    let size = |picture: &Picture| (picture.width, picture.height);
+    let ((width, height), (w, h)) = (size(picture), size(&truth.picture));
+    match (width, height) == (w, h) {
+        true => Ok(()),
+        false => Err(MeasureError::Size(width, height, w, h)),
+    }
 }
 
 /// One run.
@@ -131,12 +181,15 @@ struct Sample {
     skipped_fraction: f64,
     non_finite: u64,
     errors: Errors,
+    mean_rays_per_pixel: Option<f64>,
 }
 
 /// A method with its renderer, which stays built between runs.
 struct Subject {
     method: Method,
     renderer: Renderer,
+    /// Rays per pixel of the scene file, which a render to a goal begins from.
+    rays_per_pixel: u32,
     build_secs: f64,
     compile_secs: f64,
 }
@@ -158,6 +211,7 @@ impl Subject {
         let seconds = renderer.seconds();
         Ok(Self {
             method,
+            rays_per_pixel: renderer.scene().settings.rays_per_pixel,
             renderer,
             build_secs: seconds.build,
             compile_secs: seconds.compile,
@@ -176,18 +230,32 @@ impl Subject {
         Ok(())
     }
 
-    fn render(
+    /// With a goal: the rays per pixel after which it is given up.
+    fn limit(&self) -> Option<u32> {
+        self.method.goal.map(|goal| goal.max_rays_per_pixel)
+    }
+
+    /// `rays_per_pixel`: `None` to the method's goal.
+    fn run(
         &mut self,
-        rays_per_pixel: u32,
+        rays_per_pixel: Option<u32>,
         seed: u32,
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<(Sample, Picture), RenderError> {
         let before = self.renderer.rays();
         let (wall, cpu) = (Instant::now(), ProcessTime::now());
-        self.renderer.set_samples(rays_per_pixel, seed)?;
+        let samples = rays_per_pixel.unwrap_or(self.rays_per_pixel);
+        self.renderer.set_samples(samples, seed)?;
         let setup_secs = wall.elapsed().as_secs_f64();
-        self.renderer
-            .advance(Budget::Complete, cancelled, &mut |_| ())?;
+        let goal = self.method.goal.filter(|_| rays_per_pixel.is_none());
+        match goal {
+            Some(goal) => self
+                .renderer
+                .render_to_error(&goal.into(), cancelled, &mut |_| ())?,
+            None => self
+                .renderer
+                .advance(Budget::Complete, cancelled, &mut |_| ())?,
+        }
         let picture = self.renderer.picture();
         let (wall_secs, cpu_secs) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
         let film = self.renderer.film();
@@ -200,6 +268,7 @@ impl Subject {
             skipped_fraction: film.counts().skipped as f64 / film.pixels.len().max(1) as f64,
             non_finite: film.non_finite_samples(),
             errors: Errors::default(),
+            mean_rays_per_pixel: self.renderer.stated().map(|s| s.mean_rays_per_pixel),
         };
         Ok((sample, picture))
     }
@@ -224,6 +293,10 @@ impl Subject {
             method: self.method,
             device: self.renderer.device_name(),
             rays_per_pixel,
+            mean_rays_per_pixel: self
+                .method
+                .goal
+                .map(|_| mean(&values(|s| s.mean_rays_per_pixel.unwrap_or(0.0)))),
             build_secs: self.build_secs,
             compile_secs: self.compile_secs,
             wall_secs,

@@ -7,6 +7,7 @@ mod against;
 mod docs;
 mod errors;
 mod fit;
+mod goal;
 mod gpu_time;
 mod machine;
 mod measure;
@@ -23,9 +24,10 @@ pub use against::{Change, Verdict, against};
 pub use docs::replace_section;
 pub use errors::{Errors, Figures, Truth};
 pub use fit::{Reach, cost_to_reach, log_log_slope};
+pub use goal::{Aim, Goal};
 pub use gpu_time::{GpuTime, gpu_time, gpu_time_markdown, gpu_time_text};
 pub use machine::Machine;
-pub use measure::{MeasureError, Plan, Shot, measure};
+pub use measure::{MeasureError, Plan, Shot, measure, rmse_of};
 pub use page::page;
 pub use paper::{
     PAPER_SCENE, PaperRow, paper_markdown, paper_rays_per_pixel, paper_rows, paper_text,

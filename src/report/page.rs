@@ -104,9 +104,13 @@ fn pictures(
             };
             let picture = inline(&picture_png(&shot.picture)?);
             let difference = inline(&difference_png(&shot.picture, &truth.picture, gain)?);
+            let at_most = match method.goal {
+                Some(_) => "at most ",
+                None => "",
+            };
             let _ = write!(
                 out,
-                "<td>{}, {level} rays per pixel<br>{picture}{difference}</td>",
+                "<td>{}, {at_most}{level} rays per pixel<br>{picture}{difference}</td>",
                 escaped(&method.label())
             );
         }

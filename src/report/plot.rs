@@ -63,7 +63,9 @@ pub fn plots(report: &Report) -> Result<Vec<Plot>, PlotError> {
     scenes.dedup();
     let mut plots = Vec::new();
     for scene in scenes {
-        let rows: Vec<&Row> = report.rows.iter().filter(|r| r.scene == scene).collect();
+        // A row with a goal is no point of a line.
+        let by_rays = report.rows.iter().filter(|r| r.method.goal.is_none());
+        let rows: Vec<&Row> = by_rays.filter(|r| r.scene == scene).collect();
         for axis in [Axis::Secs, Axis::RaysPerPixel] {
             if let Some(chart) = Chart::of(&rows, axis) {
                 let (svg, png) = chart.render().map_err(|reason| PlotError {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Errors, Machine, Reach};
+use super::{Errors, Goal, Machine, Reach};
 use crate::renderer::{Skip, StatsRays};
 use crate::scene::{BackendChoice, Composite, Estimator, SamplerKind};
 
@@ -47,7 +47,7 @@ pub struct ReferenceNote {
 }
 
 /// One way to render.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Method {
     #[serde(with = "by_name")]
     pub backend: BackendChoice,
@@ -64,13 +64,16 @@ pub struct Method {
         with = "by_name_if_any"
     )]
     pub without: Option<Skip>,
+    /// What decides how many rays are taken, unless it is their number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub goal: Option<Goal>,
     /// With the preview filter.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub filter: bool,
 }
 
 impl Method {
-    /// "cpu direct sobol"; a quotient composite and a saving that is off are named.
+    /// "cpu direct sobol"; a quotient composite, a goal and a saving that is off are named.
     pub fn label(&self) -> String {
         use crate::scene::Choice;
         let mut label = format!(
@@ -85,6 +88,10 @@ impl Method {
         }
         if self.filter {
             label += " filtered";
+        }
+        if let Some(goal) = &self.goal {
+            label += " ";
+            label += &goal.label();
         }
         if let Some(skip) = self.without {
             label += " without ";
@@ -103,7 +110,11 @@ pub struct Row {
     #[serde(flatten)]
     pub method: Method,
     pub device: String,
+    /// With a goal: the most that a pixel may take.
     pub rays_per_pixel: u32,
+    /// With a goal: what a pixel within reach took, mean over pixels and runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_rays_per_pixel: Option<f64>,
     /// Acceleration structures and packing, once.
     pub build_secs: f64,
     /// Opening the device and composing its shaders, once; they are compiled in the warm-up.
@@ -227,7 +238,9 @@ mod by_name {
 #[cfg(test)]
 pub(super) mod test_support {
     use super::*;
-    use crate::report::Figures;
+    use crate::renderer::CameraNoise;
+    use crate::report::{Aim, Figures};
+    use crate::scene::NoiseFit;
 
     /// Two rows of two runs each.
     pub fn report() -> Report {
@@ -237,6 +250,7 @@ pub(super) mod test_support {
             sampler,
             composite: Composite::Additive,
             without: None,
+            goal: None,
             filter: false,
         };
         let row = |method, secs: f64, mse: f64| Row {
@@ -246,6 +260,7 @@ pub(super) mod test_support {
             method,
             device: "2 CPU threads".into(),
             rays_per_pixel: 4,
+            mean_rays_per_pixel: None,
             build_secs: 0.01,
             compile_secs: 0.0,
             wall_secs: secs / 2.0,
@@ -312,12 +327,27 @@ pub(super) mod test_support {
     fn json_reads_back_and_names_what_it_holds() {
         let mut report = report();
         report.rows[0].method.without = Some(Skip::OutOfReach);
+        let fit = [1.0, 2.0, 3.0].map(|a| NoiseFit { a, b: 0.25 });
+        let max_rays_per_pixel = 64;
+        let goal = |aim| Goal {
+            aim,
+            max_rays_per_pixel,
+        };
+        report.rows[0].method.goal = Some(goal(Aim::TargetError(0.004)));
+        report.rows[0].mean_rays_per_pixel = Some(31.5);
+        let label = report.rows[0].method.label();
+        assert_eq!(
+            label,
+            "cpu direct sobol to error 0.004 without out-of-reach"
+        );
+        report.rows.push(report.rows[0].clone());
+        report.rows[2].method.goal = Some(goal(Aim::CameraNoise(CameraNoise { fit })));
         let json = serde_json::to_string(&report).unwrap();
         assert_eq!(serde_json::from_str::<Report>(&json).unwrap(), report);
         let value: serde_json::Value = serde_json::from_str(&json).unwrap();
         assert_eq!(value["rows"][0]["without"], "out-of-reach");
         let row = value["rows"][1].as_object().unwrap();
-        assert!(!row.contains_key("without"));
+        assert!(!row.contains_key("without") && !row.contains_key("goal"));
         for (key, expected) in [
             ("backend", "cpu"),
             ("estimator", "paper"),

@@ -11,7 +11,10 @@ type Column = (&'static str, fn(&Row) -> String);
 const COLUMNS: [Column; 16] = [
     ("scene", |r| r.scene.clone()),
     ("method", |r| r.method.label()),
-    ("rays/px", |r| r.rays_per_pixel.to_string()),
+    ("rays/px", |r| match r.mean_rays_per_pixel {
+        Some(mean) => format!("{mean:.1}"),
+        None => r.rays_per_pixel.to_string(),
+    }),
     ("wall s", |r| spread(r.wall_secs, r.wall_secs_sd)),
     ("CPU s", |r| spread(r.cpu_secs, r.cpu_secs_sd)),
     ("Mrays", |r| format!("{:.3}", traced(r) as f64 / 1e6)),
@@ -152,7 +155,7 @@ fn remarks(report: &Report) -> Vec<String> {
     let mut lines = Vec::new();
     for (name, slope) in &report.slopes {
         lines.push(format!(
-            "{name}: RMSE falls as rays per pixel to the {slope:.3}"
+            "{name}: RMSE falls as rays per pixel to the power {slope:.3}"
         ));
     }
     for target in &report.targets {
@@ -171,6 +174,12 @@ fn remarks(report: &Report) -> Vec<String> {
             target.scene,
             target.method.label(),
             target.rmse
+        ));
+    }
+    let limits = report.rows.iter().filter(|r| r.method.goal.is_some());
+    if let Some(most) = limits.map(|r| r.rays_per_pixel).max() {
+        lines.push(format!(
+            "with a goal, rays/px are those that a pixel within reach took on average, at most {most}; the seconds and Mrays hold the pilot's"
         ));
     }
     let non_finite: u64 = report.rows.iter().map(|r| r.non_finite_samples).sum();
@@ -226,6 +235,8 @@ pub fn csv(report: &Report) -> String {
         put("width", row.width.to_string());
         put("height", row.height.to_string());
         put("rays_per_pixel", row.rays_per_pixel.to_string());
+        let mean = row.mean_rays_per_pixel.map(|mean| mean.to_string());
+        put("mean_rays_per_pixel", mean.unwrap_or_default());
         put("runs", row.runs.len().to_string());
         let seeds = row.runs.iter().map(|r| r.seed.to_string());
         put("seeds", seeds.collect::<Vec<_>>().join(" "));

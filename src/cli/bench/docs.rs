@@ -1,0 +1,39 @@
+//! A page with a section for a table.
+
+use std::path::{Path, PathBuf};
+
+use super::files::read_text;
+use crate::cli::Failure;
+use crate::output::write_text;
+use crate::report::replace_section;
+
+/// A page with a section for this table.
+pub(super) struct Docs {
+    path: PathBuf,
+    page: String,
+    section: &'static str,
+}
+
+impl Docs {
+    pub(super) fn open(path: &Path, section: &'static str) -> Result<Self, Failure> {
+        let page = read_text(path)?;
+        if replace_section(&page, section, "").is_none() {
+            return Err(Failure(format!(
+                "{}: has no section <!-- {section} --> ... <!-- end -->",
+                path.display()
+            )));
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            page,
+            section,
+        })
+    }
+
+    pub(super) fn write(&self, content: &str) -> Result<(), Failure> {
+        if let Some(page) = replace_section(&self.page, self.section, content) {
+            write_text(&self.path, &page)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,58 @@
+//! What is read and written: earlier results, figures, plots, the page.
+
+use std::path::Path;
+
+use super::benchmark::Gallery;
+use crate::cli::{Failure, say};
+use crate::output::{write_bytes, write_text};
+use crate::report::{Axis, FORMAT, Plot, Report, csv, page, plots};
+
+pub(super) fn write_figures(report: &Report, folder: &Path) -> Result<(), Failure> {
+    let mut json = serde_json::to_string_pretty(report)?;
+    json.push('\n');
+    write_text(&folder.join("results.json"), &json)?;
+    write_text(&folder.join("results.csv"), &csv(report))?;
+    Ok(())
+}
+
+pub(super) fn write_pictures(
+    report: &Report,
+    gallery: &Gallery,
+    folder: &Path,
+) -> Result<(), Failure> {
+    let plots: Vec<Plot> = plots(report)?;
+    for plot in &plots {
+        let axis = match plot.axis {
+            Axis::Secs => "time",
+            Axis::RaysPerPixel => "rays",
+        };
+        let path = folder.join(format!("{}-error-{axis}.svg", plot.scene));
+        write_text(&path, &plot.svg)?;
+        write_bytes(&path.with_extension("png"), &plot.png)?;
+    }
+    let page = page(report, &plots, &gallery.shots, &gallery.truths)?;
+    write_text(&folder.join("index.html"), &page)?;
+    say(
+        "note",
+        &format!("the report is {}", folder.join("index.html").display()),
+    );
+    Ok(())
+}
+
+pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path).map_err(|error| Failure(format!("{}: {error}", path.display())))
+}
+
+pub(super) fn read_report(path: &Path) -> Result<Report, Failure> {
+    let problem = |reason: String| Failure(format!("{}: {reason}", path.display()));
+    let text = read_text(path)?;
+    let value: serde_json::Value = serde_json::from_str(&text)
+        .map_err(|error| problem(format!("is no results.json: {error}")))?;
+    let format = value.get("format").and_then(serde_json::Value::as_u64);
+    if format != Some(u64::from(FORMAT)) {
+        return Err(problem(format!(
+            "is no results.json of format {FORMAT}; make it again with this version"
+        )));
+    }
+    serde_json::from_value(value).map_err(|error| problem(format!("is no results.json: {error}")))
+}
