@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use mixray::output::ChannelFile;
-use mixray::renderer::{Budget, Renderer, RendererOptions, Skip};
+use mixray::renderer::Skip;
+use mixray::scene::Choice;
 
 /// A ball over a textured floor, out of focus: background, edge and virtual pixels.
 const SCENE: &str = "\
@@ -321,90 +322,78 @@ fn the_papers_table_has_a_row_a_count_of_rays() {
     }
 }
 
-/// Pictures of a few seeds without some savings, and the rays that they took together.
-fn pictures(folder: &Folder, without: &[Skip]) -> (Vec<Vec<f32>>, u64) {
-    let scene = mixray::scene::load(&folder.path("scene.toml")).unwrap();
-    let options = RendererOptions {
-        without: without.iter().copied().collect(),
-        ..RendererOptions::default()
-    };
-    let mut renderer = Renderer::new(scene, options).unwrap();
-    let pictures = (0..64)
-        .map(|seed| {
-            renderer.set_samples(8, seed).unwrap();
-            renderer
-                .advance(Budget::Complete, &|| false, &mut |_| ())
-                .unwrap();
-            renderer.picture().linear.into_flattened()
-        })
-        .collect();
-    (pictures, renderer.rays().traced())
-}
-
-/// Those that are proven not to change the result do not; the others have the same expectation.
-#[test]
-fn savings_change_the_result_no_more_than_they_say() {
-    let folder = Folder::new();
-    let (with, rays_with) = pictures(&folder, &[]);
-    for skip in [Skip::OutOfReach, Skip::EdgeReal] {
-        let (without, rays_without) = pictures(&folder, &[skip]);
-        assert!(with == without, "{skip:?}");
-        assert!(rays_without >= rays_with);
-    }
-    for skip in [Skip::Plan, Skip::Beams] {
-        let (without, rays_without) = pictures(&folder, &[skip]);
-        // The plan moves rays; what it saves is error.
-        assert_ne!(rays_without, rays_with, "control: {skip:?} did something");
-        let z = largest_z(&with, &without);
-        assert!(z < 4.0, "{skip:?}: {z}");
-        let darker: Vec<Vec<f32>> = (without.iter())
-            .map(|picture| picture.iter().map(|x| x * 0.98).collect())
-            .collect();
-        assert!(largest_z(&with, &darker) > 4.0, "control: 2% is noticed");
-    }
-}
-
-/// Of the picture's mean and of its four bands' means: the difference over its standard error.
-fn largest_z(a: &[Vec<f32>], b: &[Vec<f32>]) -> f64 {
-    let values = a[0].len();
-    let bands = (0..4).map(|i| i * values / 4..(i + 1) * values / 4);
-    bands
-        .chain(std::iter::once(0..values))
-        .map(|band| {
-            let moments = |pictures: &[Vec<f32>]| {
-                let means: Vec<f64> = pictures
-                    .iter()
-                    .map(|p| p[band.clone()].iter().map(|&x| f64::from(x)).sum::<f64>())
-                    .collect();
-                let count = means.len() as f64;
-                let mean = means.iter().sum::<f64>() / count;
-                let squares: f64 = means.iter().map(|m| (m - mean).powi(2)).sum();
-                (mean, squares / (count * (count - 1.0)))
-            };
-            let ((mean_a, variance_a), (mean_b, variance_b)) = (moments(a), moments(b));
-            let error = (variance_a + variance_b).sqrt();
-            // A band that only shows the photograph has no error at all.
-            (mean_a - mean_b).abs() / error.max(1e-9 * mean_a.abs())
-        })
-        .fold(0.0, f64::max)
-}
-
 #[test]
 fn each_saving_has_its_rows() {
     let folder = Folder::new();
-    folder.succeed(&format!("{QUICK} --ablate"));
+    let shown = folder.succeed(&format!("{QUICK} --ablate --goal-rpp 64"));
     let report = folder.json("out/results.json");
     let rows = report["rows"].as_array().unwrap();
-    // paper, direct, and direct without four savings, at two counts of rays.
-    assert_eq!(rows.len(), 2 * (2 + 4));
-    let rays = |without: serde_json::Value| -> u64 {
+    // paper, direct, and direct without seven savings, at two counts of rays; two goals with their savings and without.
+    assert_eq!(rows.len(), 2 * (2 + 7) + 2 * 2);
+    for (name, _) in Skip::CHOICES {
+        let has_row = rows.iter().any(|row| row["without"] == *name);
+        assert_eq!(has_row, *name != "specialisation", "{name}");
+    }
+    let rays_of = |row: &serde_json::Value| -> u64 {
+        let rays = row["rays"].as_object().unwrap();
+        rays.values().map(|count| count.as_u64().unwrap()).sum()
+    };
+    let rays = |without: serde_json::Value| {
         let row = rows.iter().find(|row| {
             row["estimator"] == "direct" && row["rays_per_pixel"] == 4 && row["without"] == without
         });
-        let rays = row.unwrap()["rays"].as_object().unwrap();
-        rays.values().map(|count| count.as_u64().unwrap()).sum()
+        rays_of(row.unwrap())
     };
-    assert!(rays("edge-real".into()) > rays(serde_json::Value::Null));
+    for saving in ["edge-real", "virtual-first"] {
+        assert!(rays(saving.into()) > rays(serde_json::Value::Null));
+    }
+    let goals: Vec<_> = rows.iter().filter(|row| row["goal"].is_object()).collect();
+    let [to_error, not_adaptive, to_noise, not_stopped] = goals.as_slice() else {
+        panic!("{goals:?}");
+    };
+    // One digit of the error at the middle of 1 and 4 rays per pixel.
+    let aim = to_error["goal"]["aim"]["target-error"].as_f64().unwrap();
+    let usual = rows
+        .iter()
+        .find(|r| r["estimator"] == "direct" && r["rays_per_pixel"] == 4);
+    let usual = usual.unwrap()["errors"]["all"]["rmse"].as_f64().unwrap();
+    assert!((aim / usual - 1.0).abs() < 0.5, "{aim} {usual}");
+    assert!(shown.contains(&format!("cpu direct sobol to error {aim} without adaptive")));
+    assert!(rays_of(not_adaptive) >= rays_of(to_error));
+    assert_eq!(not_adaptive["without"], "adaptive");
+    assert!(shown.contains("cpu direct sobol to camera noise without camera-noise"));
+    assert_eq!(to_noise["goal"]["aim"]["camera-noise"][2][0], 0.02);
+    assert_eq!(not_stopped["without"], "camera-noise");
+    let taken = |row: &serde_json::Value| row["mean_rays_per_pixel"].as_f64().unwrap();
+    assert!(taken(to_noise) >= 16.0 && taken(to_noise) <= taken(not_stopped));
+    assert_eq!(taken(not_stopped), 64.0);
+}
+
+#[test]
+fn savings_and_goals_have_rows_by_name() {
+    let folder = Folder::new();
+    folder.succeed(&format!(
+        "{QUICK} --estimators direct --no-skip cones --target-error 0.5 --camera-noise 0.5,20 --goal-rpp 16"
+    ));
+    let report = folder.json("out/results.json");
+    let shown: Vec<String> = (report["rows"].as_array().unwrap().iter())
+        .map(|row| format!("{} {}", row["without"], row["goal"]["aim"]))
+        .collect();
+    let noise = "{\"camera-noise\":[[0.5,20.0],[0.5,20.0],[0.5,20.0]]}";
+    let expected = [
+        "null null".to_owned(),
+        "null null".to_owned(),
+        "\"cones\" null".to_owned(),
+        "\"cones\" null".to_owned(),
+        "null {\"target-error\":0.5}".to_owned(),
+        format!("null {noise}"),
+    ];
+    assert_eq!(shown, expected);
+    folder.refuse(
+        &format!("{QUICK} --no-skip specialisation"),
+        "--backends gpu",
+    );
+    folder.refuse(&format!("{QUICK} --camera-noise 1"), "--camera-noise");
 }
 
 /// Renders ranges of `total` rays into part-0.exr and so on.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use mixray::cpu::render::render_pass;
 use mixray::film::{Film, composite};
 use mixray::gpu::{GpuBackend, GpuDevice, harness::test_device};
-use mixray::renderer::{Budget, Cancel, Pass, RayTotals, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Cancel, Pass, RayTotals, Renderer, RendererOptions, Without};
 use mixray::scene::Scene;
 
 use super::assets::write_assets;
@@ -26,8 +26,13 @@ pub fn load(text: &str) -> Scene {
 }
 
 pub fn renderer(scene: Scene, all_planes: bool) -> Renderer {
+    renderer_without(scene, all_planes, Without::default())
+}
+
+pub fn renderer_without(scene: Scene, all_planes: bool, without: Without) -> Renderer {
     let options = RendererOptions {
         all_planes,
+        without,
         ..RendererOptions::default()
     };
     Renderer::new(scene, options).unwrap_or_else(|error| panic!("{error}"))
@@ -144,11 +149,19 @@ pub fn backend_for(gpu: &Arc<GpuDevice>, renderer: &Renderer) -> GpuBackend {
 /// Renders the case on both backends, and two perturbed ones that must be told apart.
 pub fn assert_agreement(case: &Case) {
     let Some(gpu) = test_device() else { return };
-    assert_scene_agrees(gpu, case.name, &load(&case.text()), case.all_planes);
+    let scene = load(&case.text());
+    assert_scene_agrees(gpu, case.name, &scene, case.all_planes, Without::default());
 }
 
-pub fn assert_scene_agrees(gpu: &Arc<GpuDevice>, name: &str, scene: &Scene, all_planes: bool) {
-    let built = renderer(scene.clone(), all_planes);
+/// The rays of the CPU.
+pub fn assert_scene_agrees(
+    gpu: &Arc<GpuDevice>,
+    name: &str,
+    scene: &Scene,
+    all_planes: bool,
+    without: Without,
+) -> RayTotals {
+    let built = renderer_without(scene.clone(), all_planes, without);
     let (film, cpu_rays) = cpu_film(&built, all_planes);
     let expected = planes(&built, &film);
     let mut backend = backend_for(gpu, &built);
@@ -180,7 +193,7 @@ pub fn assert_scene_agrees(gpu: &Arc<GpuDevice>, name: &str, scene: &Scene, all_
     let mut brighter = scene.clone();
     brighten(&mut brighter);
     for (what, scene) in [("seed", seeded), ("material", brighter)] {
-        let other = renderer(scene, all_planes);
+        let other = renderer_without(scene, all_planes, without);
         backend
             .set_scene(other.packed())
             .unwrap_or_else(|error| panic!("{error}"));
@@ -192,6 +205,7 @@ pub fn assert_scene_agrees(gpu: &Arc<GpuDevice>, name: &str, scene: &Scene, all_
             "{name}, {what}: {share}"
         );
     }
+    cpu_rays
 }
 
 /// Every colour 1% brighter (or darker, where it is white).

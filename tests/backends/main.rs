@@ -5,9 +5,13 @@ mod assets;
 mod device;
 mod scenes;
 
-use mixray::gpu::{Features, harness::test_device};
+use mixray::gpu::{Features, GpuBackend, harness::test_device};
+use mixray::renderer::{Skip, Without};
 
-use agreement::{assert_agreement, assert_scene_agrees, load, renderer};
+use agreement::{
+    Difference, assert_agreement, assert_scene_agrees, backend_for, gpu_film, load, planes,
+    renderer,
+};
 use assets::shared_data;
 use scenes::{CASES, Case, case};
 
@@ -84,6 +88,49 @@ fn the_table_is_complete() {
     }
 }
 
+/// The savings of the estimator switched off, on matt and on glossy ground.
+#[test]
+fn without_its_savings() {
+    let Some(gpu) = test_device() else { return };
+    let all = [Skip::VirtualFirst, Skip::Cones, Skip::LastVertex];
+    for (name, without) in [
+        ("matt_with_an_occluder_under_a_quad", &all[..]),
+        ("matt_with_an_occluder_under_a_quad", &all[..1]),
+        ("mirrors_and_gloss", &all[..2]),
+    ] {
+        let case = case(name);
+        let scene = load(&case.text());
+        let off: Without = without.iter().copied().collect();
+        let rays = assert_scene_agrees(gpu, name, &scene, case.all_planes, off);
+        // Negative control: the savings did something.
+        let (_, usual) = agreement::cpu_film(&renderer(scene, case.all_planes), case.all_planes);
+        assert_ne!(rays, usual, "{name} {without:?}");
+    }
+}
+
+/// Kernels that hold more than the scene needs give the same film up to rounding.
+#[test]
+fn specialisation_changes_no_more_than_rounding() {
+    let Some(gpu) = test_device() else { return };
+    let case = case("matt_with_an_occluder_under_a_quad");
+    let built = renderer(load(&case.text()), case.all_planes);
+    let film = |backend: &mut GpuBackend| gpu_film(backend, &built, case.all_planes);
+    let (special, special_rays) = film(&mut backend_for(gpu, &built));
+    let mut general = GpuBackend::new(std::sync::Arc::clone(gpu), built.packed(), false)
+        .unwrap_or_else(|error| panic!("{error}"));
+    let (general, general_rays) = film(&mut general);
+    let expected = planes(&built, &special);
+    let difference = Difference::between(&expected, &planes(&built, &general));
+    eprintln!("{difference:?}; rays {special_rays:?}, {general_rays:?}");
+    assert!(difference.agrees(), "{difference:?}");
+    let mut other = load(&case.text());
+    other.settings.seed += 1;
+    let other = renderer(other, case.all_planes);
+    let (film, _) = gpu_film(&mut backend_for(gpu, &other), &other, case.all_planes);
+    let control = Difference::between(&expected, &planes(&other, &film));
+    assert!(!control.agrees(), "control: another seed shows");
+}
+
 /// Models as they are found in the wild, under a studio map.
 #[test]
 fn models_of_others() {
@@ -126,6 +173,6 @@ fn models_of_others() {
             )
         });
         let text = mirrors.clone() + &objects.concat();
-        assert_scene_agrees(gpu, pair[0].0, &load(&text), true);
+        assert_scene_agrees(gpu, pair[0].0, &load(&text), true, Without::default());
     }
 }

@@ -10,5 +10,6 @@ mod lens;
 mod perfect_proxy;
 mod photograph;
 mod repeatability;
+mod savings;
 mod stated_error;
 mod support;

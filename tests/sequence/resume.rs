@@ -52,6 +52,27 @@ fn frames_of_a_folder() {
     assert_ne!(folder.frames_of("other"), whole, "control");
 }
 
+/// A saving that is left out makes other frames, which are not mixed with those that are there, unless it changes nothing at all.
+#[test]
+fn frames_without_a_saving() {
+    let folder = Folder::new();
+    folder.write("scene.toml", BALL);
+    folder.frames(2, 0.1);
+    folder.trajectory(2, 0.1, &[]);
+    let to = |out: &str, flags: &[&str]| {
+        folder.sequence(&[&["--frames", "in", "-o", out], flags].concat());
+        folder.frames_of(out)
+    };
+    let usual = to("usual", &[]);
+    assert_eq!(to("virtual-first", &["--no-skip", "virtual-first"]), usual);
+    assert_ne!(
+        to("plan", &["--no-skip", "cones", "--no-skip", "beams"]),
+        usual
+    );
+    let again = ["--frames", "in", "-o", "usual", "--no-skip", "beams"];
+    folder.refused(&again, "--overwrite");
+}
+
 #[test]
 fn frames_of_a_file() {
     let folder = folder();
