@@ -433,6 +433,7 @@ fn ranges_merged_equal_one_run() {
         "--sampler jittered --estimator paper",
         "--composite quotient",
         "--sampler cmj --no-skip plan",
+        "--no-skip cones --no-skip edge-real",
     ] {
         let folder = Folder::new();
         render_parts(&folder, flags, 16, &[(0, 3), (3, 8), (8, 16)]);
@@ -494,6 +495,7 @@ fn films_that_do_not_fit_are_refused() {
         ("--rpp 16 --sampler cmj", "sampler"),
         ("--rpp 16 --estimator paper", "estimator"),
         ("--rpp 16 --max-bounces 3", "path depth"),
+        ("--rpp 16 --no-skip cones", "--no-skip"),
         ("--rpp 20", "rays per pixel"),
     ] {
         folder.succeed(&format!(

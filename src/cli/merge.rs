@@ -74,7 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         range.1 = part.note.range.1;
     }
     let total = first.note.total;
-    let renderer = Renderer::with_film(scene, film, range.1)?;
+    let renderer = Renderer::with_film(scene, film, range.1, first.note.without)?;
     let complete = range == (0, total);
     write(
         &renderer,

@@ -308,7 +308,7 @@ pub(super) fn write(
                 let planes = renderer.planes();
                 if let Some(range) = film_range {
                     let film = renderer.film();
-                    let note = FilmNote::new(renderer.scene(), range);
+                    let note = FilmNote::new(renderer.scene(), range, renderer.without());
                     write_film(target, &picture, &planes, &metadata, film, &note)?;
                 } else {
                     write_exr(target, &picture, &planes, &metadata)?;

@@ -8,6 +8,7 @@ use super::channels::ChannelFile;
 use super::exr_file::{Channels, push_channel, write_layers};
 use super::{Metadata, OutputError, Target};
 use crate::film::{Film, GuideSums, Picture, PixelSums, Planes, Sum3};
+use crate::renderer::Without;
 use crate::scene::{Choice, Composite, Estimator, Overrides, SamplerKind, Scene, Settings};
 
 /// What a film is a part of: only parts of one render can be put together.
@@ -27,10 +28,12 @@ pub struct FilmNote {
     pub estimator: Estimator,
     pub sampler: SamplerKind,
     pub composite: Composite,
+    /// Savings that were left out: real rays that edge pixels lack are traced as the others were.
+    pub without: Without,
 }
 
 /// Attribute names of [`FilmNote`], in its order.
-const NOTE_NAMES: [&str; 11] = [
+const NOTE_NAMES: [&str; 12] = [
     "mixray.film.version",
     "mixray.film.scene",
     "mixray.film.fingerprint",
@@ -42,11 +45,12 @@ const NOTE_NAMES: [&str; 11] = [
     "mixray.film.estimator",
     "mixray.film.sampler",
     "mixray.film.composite",
+    "mixray.film.without",
 ];
 
 impl FilmNote {
     /// Of a film that holds these samples of the scene's rays per pixel.
-    pub fn new(scene: &Scene, range: (u32, u32)) -> Self {
+    pub fn new(scene: &Scene, range: (u32, u32), without: Without) -> Self {
         let path = std::path::absolute(&scene.path).unwrap_or_else(|_| scene.path.clone());
         let settings = &scene.settings;
         Self {
@@ -60,6 +64,7 @@ impl FilmNote {
             estimator: settings.estimator,
             sampler: settings.sampler,
             composite: settings.composite,
+            without,
         }
     }
 
@@ -90,6 +95,10 @@ impl FilmNote {
             .or_else(|| differ("sampler", self.sampler.name(), other.sampler.name()))
             .or_else(|| differ("composite", self.composite.name(), other.composite.name()))
             .or_else(|| {
+                let [a, b] = [self.without, other.without].map(Without::names);
+                differ("savings left out (--no-skip)", &a, &b)
+            })
+            .or_else(|| {
                 (self.fingerprint != other.fingerprint).then(|| {
                     format!(
                         "the films are of different scenes: {} and {}",
@@ -99,7 +108,7 @@ impl FilmNote {
             })
     }
 
-    fn texts(&self) -> [String; 11] {
+    fn texts(&self) -> [String; 12] {
         [
             self.version.clone(),
             self.scene.clone(),
@@ -112,6 +121,7 @@ impl FilmNote {
             self.estimator.name().to_owned(),
             self.sampler.name().to_owned(),
             self.composite.name().to_owned(),
+            self.without.names(),
         ]
     }
 
@@ -128,6 +138,7 @@ impl FilmNote {
             estimator: Estimator::from_name(&text(8)?)?,
             sampler: SamplerKind::from_name(&text(9)?)?,
             composite: Composite::from_name(&text(10)?)?,
+            without: Without::from_names(&text(11)?)?,
         };
         let (first, end) = note.range;
         let is_range = first < end && end <= note.total;
@@ -320,6 +331,7 @@ fn guide_fields() -> Vec<Field<GuideSums, f32, String>> {
 mod tests {
     use super::*;
     use crate::film::{Guide, Sample, planes};
+    use crate::renderer::Skip;
     use crate::scene::Camera;
     use glam::Vec3;
 
@@ -357,6 +369,7 @@ mod tests {
             estimator: Estimator::Paper,
             sampler: SamplerKind::Cmj,
             composite: Composite::Quotient,
+            without: [Skip::Plan, Skip::LastVertex].into_iter().collect(),
         }
     }
 
@@ -414,7 +427,7 @@ mod tests {
     fn every_difference_is_a_mismatch() {
         assert_eq!(note().mismatch(&note()), None);
         type Change = fn(&mut FilmNote);
-        let changes: [(&str, Change); 8] = [
+        let changes: [(&str, Change); 9] = [
             ("version", |n| n.version.push('1')),
             ("rays per pixel", |n| n.total = 99),
             ("seed", |n| n.seed = 0),
@@ -422,6 +435,7 @@ mod tests {
             ("estimator", |n| n.estimator = Estimator::Direct),
             ("sampler", |n| n.sampler = SamplerKind::Sobol),
             ("composite", |n| n.composite = Composite::Additive),
+            ("--no-skip", |n| n.without = Without::default()),
             ("scenes", |n| n.fingerprint.push('0')),
         ];
         for (word, change) in changes {

@@ -210,6 +210,11 @@ impl Renderer {
         }
     }
 
+    /// The savings that it does without.
+    pub fn without(&self) -> Without {
+        self.options.without
+    }
+
     /// Whether the preview filter is on.
     pub fn is_filtered(&self) -> bool {
         self.options.filter
@@ -349,12 +354,17 @@ impl Renderer {
         self.replay_real_in_time(everywhere)
     }
 
-    /// A renderer that goes on from the film of an earlier one of the same scene and settings: it stands at the film's last sample, which
+    /// A renderer that goes on from the film of an earlier one of the same scene, settings and savings left out: it stands at the film's last sample, which
     /// comes just before `end` in rays per pixel, and traces what edge pixels lack.
     ///
     /// # Errors
     /// As [`Renderer::new`]; or the film is of another size than the camera.
-    pub fn with_film(scene: Scene, film: Film, end: u32) -> Result<Self, RenderError> {
+    pub fn with_film(
+        scene: Scene,
+        film: Film,
+        end: u32,
+        without: Without,
+    ) -> Result<Self, RenderError> {
         let size = (scene.camera.width, scene.camera.height);
         if (film.width, film.height) != size {
             let sizes = MergeError::Size(film.width, film.height, size.0, size.1);
@@ -363,10 +373,11 @@ impl Renderer {
         let options = RendererOptions {
             all_planes: !film.guides.is_empty(),
             sample_range: Some((film.first_sample, end)),
+            without,
             ..RendererOptions::default()
         };
         let mut renderer = Self::new(scene, options)?;
-        // The film's samples were taken by its own plan: without savings, or on a machine that rounds otherwise, another one than ours.
+        // The film's samples were taken by its own plan: on a machine that rounds otherwise, another one than ours.
         for (info, sums) in renderer.packed.pixels.iter_mut().zip(&film.pixels) {
             info.sample_factor = sums.sample_factor.max(1);
         }

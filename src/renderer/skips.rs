@@ -58,6 +58,22 @@ impl Without {
         self.0 & bit(skip) != 0
     }
 
+    /// Names with commas between them; "none".
+    pub fn names(self) -> String {
+        let off = Skip::CHOICES.iter().filter(|(_, s)| self.contains(*s));
+        let names: Vec<&str> = off.map(|&(name, _)| name).collect();
+        match names.as_slice() {
+            [] => "none".to_owned(),
+            names => names.join(","),
+        }
+    }
+
+    /// What [`Without::names`] has written.
+    pub fn from_names(names: &str) -> Option<Self> {
+        let names = names.split(',').filter(|name| *name != "none");
+        names.map(Skip::from_name).collect()
+    }
+
     /// Takes the estimator's share of the savings back.
     pub(super) fn apply_to_frame(self, frame: &mut Frame) {
         for (skip, flag) in [
@@ -131,6 +147,12 @@ mod tests {
             let without: Without = [*skip].into_iter().collect();
             let on = Skip::CHOICES.iter().filter(|(_, s)| without.contains(*s));
             assert_eq!(on.count(), 1, "{name}");
+            assert_eq!(without.names(), *name);
         }
+        for without in [&[][..], &[Skip::CameraNoise, Skip::Plan]] {
+            let without: Without = without.iter().copied().collect();
+            assert_eq!(Without::from_names(&without.names()), Some(without));
+        }
+        assert_eq!(Without::from_names("plan,cone"), None);
     }
 }

@@ -95,7 +95,6 @@ fn without_its_savings() {
     let all = [Skip::VirtualFirst, Skip::Cones, Skip::LastVertex];
     for (name, without) in [
         ("matt_with_an_occluder_under_a_quad", &all[..]),
-        ("matt_with_an_occluder_under_a_quad", &all[..1]),
         ("mirrors_and_gloss", &all[..2]),
     ] {
         let case = case(name);

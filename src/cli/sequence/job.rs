@@ -14,7 +14,9 @@ use crate::cli::{Failure, Outcome, interrupt, print, say};
 use crate::gpu::GpuStages;
 use crate::output::{check_writable, write_text};
 use crate::packed::next_anchor;
-use crate::renderer::{Budget, FrameEdit, PreviousView, RayTotals, Renderer, RendererOptions, Without};
+use crate::renderer::{
+    Budget, FrameEdit, PreviousView, RayTotals, Renderer, RendererOptions, Without,
+};
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{Camera, Exposure, Lens, MotionBlurMethod, Scene, fingerprint_of};
 use crate::stages::{Finished, finish};

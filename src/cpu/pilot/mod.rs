@@ -19,7 +19,8 @@ use importance::{PilotLights, importance};
 
 use super::contribution::ESTIMATOR_PAPER;
 use crate::packed::{
-    FRAME_AOVS, FRAME_BOTH_SHADOWS, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene, PixelInfo,
+    FRAME_AOVS, FRAME_BOTH_SHADOWS, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH,
+    PackedScene, PixelInfo,
 };
 
 /// Fewer rays per pixel than this are not worth a measurement.
