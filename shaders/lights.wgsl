@@ -29,10 +29,10 @@ fn light_select(u: f32, coin: f32) -> u32 {
     return lights[index].alias_;
 }
 
-fn light_sample(position: vec3<f32>, u: vec4<f32>) -> LightSample {
-    let light = lights[light_select(u.x, u.w)];
+fn light_sample(index: u32, position: vec3<f32>, u: vec2<f32>) -> LightSample {
+    let light = lights[index];
     if light.kind == LIGHT_ENVIRONMENT {
-        let s = env_sample(u.y, u.z);
+        let s = env_sample(u.x, u.y);
         return LightSample(s.direction, FAR, s.radiance, s.pdf * light.select_pdf, false, light.side);
     }
     @if(delta_lights) {
@@ -44,7 +44,7 @@ fn light_sample(position: vec3<f32>, u: vec4<f32>) -> LightSample {
         }
     }
     @if(area_lights) {
-        return sample_area_light(light, position, u.y, u.z);
+        return sample_area_light(light, position, u.x, u.y);
     }
     return no_light();
 }

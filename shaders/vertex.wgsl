@@ -10,7 +10,7 @@ import package::contribution::{accumulate, density_weight, draw};
 import package::contribution::{
     SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
 };
-import package::lights::{LightSample, light_pdf_hit, light_sample};
+import package::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 import package::math::{dot3, exp_, safe_sqrt};
 import package::state::{
     COINCIDENCE, DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_SHADOW, PathState,
@@ -131,7 +131,8 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette:
     if frame.light_count == 0u || bsdf_is_delta(s) { return; }
     let difference = is_difference(st);
     let set_id = select(SET_PATH_LIGHT, SET_DIFFERENCE_LIGHT, difference);
-    let l = light_sample(s.position, draw(st, set_id));
+    let u = draw(st, set_id);
+    let l = light_sample(light_select(u.x, u.w), s.position, u.yz);
     let contribution = light_contribution(st, s, wo, roulette, l);
     if any(contribution != vec3<f32>(0.0)) {
         (*st).shadow_contribution = contribution;

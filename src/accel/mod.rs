@@ -28,7 +28,10 @@ mod gpu_tests;
 #[cfg(test)]
 mod tests;
 
+use std::sync::OnceLock;
+
 use glam::Vec3;
+use obvhs::bvh2::Bvh2;
 use thiserror::Error;
 
 use crate::packed::NONE;
@@ -94,16 +97,20 @@ pub enum AccelError {
     Coordinate { triangle: usize },
 }
 
-/// The triangles of one world, ready for rays on the CPU and for upload to a GPU.
+/// The triangles of one world, ready for rays on the CPU and, once a GPU asks, for upload.
 pub struct WorldBvh {
     wide: WideBvh,
-    compressed: CompressedBvh,
+    /// What the GPU's tree is made from.
+    tree: Option<Bvh2>,
+    triangles: Vec<[Vec3; 3]>,
+    first_id: u32,
+    compressed: OnceLock<CompressedBvh>,
     kernel: Kernel,
     bounds: Option<(Vec3, Vec3)>,
 }
 
 impl WorldBvh {
-    /// Builds both trees. `triangles` are anchor-relative, in metres; ids are `first_id` plus the index. No triangles is legal: every ray
+    /// Builds the CPU's tree. `triangles` are anchor-relative, in metres; ids are `first_id` plus the index. No triangles is legal: every ray
     /// misses.
     ///
     /// # Errors
@@ -125,34 +132,46 @@ impl WorldBvh {
                 high = high.max(*vertex);
             }
         }
-        let (wide, compressed) = match binary::build(triangles) {
-            Some(tree) => match Self::collapse(&tree, triangles, first_id) {
-                Some(both) => both,
+        let mut tree = binary::build(triangles);
+        let mut wide = WideBvh::empty();
+        if let Some(built) = &mut tree {
+            wide = Self::collapse(built, triangles, first_id).unwrap_or_else(|| {
                 // A tree too deep for the traversal stacks; the balanced one never is.
-                None => Self::collapse(&binary::build_balanced(triangles), triangles, first_id)
-                    .expect("a balanced tree fits the stacks"),
-            },
-            None => (WideBvh::empty(), CompressedBvh::empty()),
-        };
+                *built = binary::build_balanced(triangles);
+                Self::collapse(built, triangles, first_id).expect("a balanced tree fits the stacks")
+            });
+        }
         Ok(WorldBvh {
             wide,
-            compressed,
+            tree,
+            triangles: triangles.to_vec(),
+            first_id,
+            compressed: OnceLock::new(),
             kernel: Kernel::best(),
             bounds: (!triangles.is_empty()).then_some((low, high)),
         })
     }
 
-    fn collapse(
-        tree: &obvhs::bvh2::Bvh2,
-        triangles: &[[Vec3; 3]],
-        first_id: u32,
-    ) -> Option<(WideBvh, CompressedBvh)> {
+    fn collapse(tree: &Bvh2, triangles: &[[Vec3; 3]], first_id: u32) -> Option<WideBvh> {
         if binary::depth(tree) > binary::MAX_DEPTH {
             return None;
         }
-        let wide = WideBvh::collapse(tree, triangles, first_id)?;
-        let compressed = CompressedBvh::convert(tree, triangles, first_id)?;
-        Some((wide, compressed))
+        WideBvh::collapse(tree, triangles, first_id)
+    }
+
+    /// The GPU's tree, made when it is first asked for: a render on the CPU does without.
+    fn compressed(&self) -> &CompressedBvh {
+        self.compressed.get_or_init(|| {
+            let convert =
+                |tree: &Bvh2| CompressedBvh::convert(tree, &self.triangles, self.first_id);
+            match &self.tree {
+                Some(tree) => convert(tree).unwrap_or_else(|| {
+                    convert(&binary::build_balanced(&self.triangles))
+                        .expect("a balanced tree fits the stack")
+                }),
+                None => CompressedBvh::empty(),
+            }
+        })
     }
 
     /// The nearest hit; of several at the same distance the smallest triangle id. A ray with a coordinate that is not finite misses.
@@ -184,17 +203,17 @@ impl WorldBvh {
 
     /// Nodes of the GPU's tree, five vec4<u32> each, at least one. Child and triangle indices inside are relative to this world.
     pub fn gpu_nodes(&self) -> &[[[u32; 4]; 5]] {
-        self.compressed.nodes()
+        self.compressed().nodes()
     }
 
     /// Triangles in the order of the GPU's leaves, three vec4<f32> each: the vertices, w of the first holding the bits of the global id.
     pub fn gpu_leaves(&self) -> &[[f32; 4]] {
-        self.compressed.leaves()
+        self.compressed().leaves()
     }
 
     /// At most `max` spheres (centre, radius) that together contain every triangle; fewer where more would hardly be smaller in total
     /// cross-section. Empty without triangles or with `max == 0`.
     pub fn bounding_spheres(&self, max: usize) -> Vec<[f32; 4]> {
-        spheres::cover(self.compressed.leaves(), max)
+        spheres::cover(&self.triangles, max)
     }
 }

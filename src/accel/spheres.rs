@@ -1,6 +1,6 @@
 //! Few spheres that contain all triangles.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// A split must take at least this share off the summed squares of the radii.
 const LEAST_GAIN: f64 = 0.15;
@@ -10,25 +10,25 @@ const BINS: usize = 16;
 const WALK_STEPS: usize = 64;
 
 struct Cluster {
-    /// First vertices' places in the leaf array.
+    /// Indices into the mesh.
     triangles: Vec<u32>,
     center: DVec3,
     radius: f64,
     split: Option<Box<(Cluster, Cluster)>>,
 }
 
-/// At most `max` spheres (centre, radius) over triangles of three vertices each, `w` ignored.
+/// At most `max` spheres (centre, radius) over the mesh's triangles.
 ///
 /// Splits the cluster whose split saves most of the sum of squared radii, which is what the cones towards the spheres cover, until none
 /// saves enough.
-pub(super) fn cover(vertices: &[[f32; 4]], max: usize) -> Vec<[f32; 4]> {
-    if vertices.is_empty() || max == 0 {
+pub(super) fn cover(mesh: &[[Vec3; 3]], max: usize) -> Vec<[f32; 4]> {
+    if mesh.is_empty() || max == 0 {
         return Vec::new();
     }
-    let all = (0..vertices.len() as u32).step_by(3).collect();
-    let mut clusters = vec![Cluster::new(vertices, all)];
+    let all = (0..mesh.len() as u32).collect();
+    let mut clusters = vec![Cluster::new(mesh, all)];
     if max > 1 {
-        clusters[0].find_split(vertices);
+        clusters[0].find_split(mesh);
     }
     while clusters.len() < max {
         let best = clusters
@@ -43,23 +43,20 @@ pub(super) fn cover(vertices: &[[f32; 4]], max: usize) -> Vec<[f32; 4]> {
             break;
         };
         let (mut a, mut b) = *parts;
-        a.find_split(vertices);
-        b.find_split(vertices);
+        a.find_split(mesh);
+        b.find_split(mesh);
         clusters.extend([a, b]);
     }
     clusters.iter().map(Cluster::rounded).collect()
 }
 
-fn corners(vertices: &[[f32; 4]], triangle: u32) -> impl Iterator<Item = DVec3> + '_ {
-    let first = triangle as usize;
-    vertices[first..first + 3]
-        .iter()
-        .map(|v| DVec3::new(v[0].into(), v[1].into(), v[2].into()))
+fn corners(mesh: &[[Vec3; 3]], triangle: u32) -> impl Iterator<Item = DVec3> + '_ {
+    mesh[triangle as usize].iter().map(|v| v.as_dvec3())
 }
 
 impl Cluster {
-    fn new(vertices: &[[f32; 4]], triangles: Vec<u32>) -> Cluster {
-        let points = || triangles.iter().flat_map(|&t| corners(vertices, t));
+    fn new(mesh: &[[Vec3; 3]], triangles: Vec<u32>) -> Cluster {
+        let points = || triangles.iter().flat_map(|&t| corners(mesh, t));
         let mut low = DVec3::INFINITY;
         let mut high = DVec3::NEG_INFINITY;
         for point in points() {
@@ -108,11 +105,11 @@ impl Cluster {
     }
 
     /// Finds the best split by the surface area heuristic on the triangles' centres, and keeps it if it gains enough.
-    fn find_split(&mut self, vertices: &[[f32; 4]]) {
+    fn find_split(&mut self, mesh: &[[Vec3; 3]]) {
         let centers: Vec<DVec3> = self
             .triangles
             .iter()
-            .map(|&t| corners(vertices, t).sum::<DVec3>() / 3.0)
+            .map(|&t| corners(mesh, t).sum::<DVec3>() / 3.0)
             .collect();
         let (low, high) = centers
             .iter()
@@ -128,7 +125,7 @@ impl Cluster {
             let mut bins = [(DVec3::INFINITY, DVec3::NEG_INFINITY); BINS];
             for (&triangle, center) in self.triangles.iter().zip(&centers) {
                 let bin = (((center[axis] - low[axis]) / width) as usize).min(BINS - 1);
-                for corner in corners(vertices, triangle) {
+                for corner in corners(mesh, triangle) {
                     bins[bin] = (bins[bin].0.min(corner), bins[bin].1.max(corner));
                 }
             }
@@ -163,7 +160,7 @@ impl Cluster {
         if left.is_empty() || right.is_empty() {
             return;
         }
-        let parts = (Cluster::new(vertices, left), Cluster::new(vertices, right));
+        let parts = (Cluster::new(mesh, left), Cluster::new(mesh, right));
         let kept = parts.0.radius.powi(2) + parts.1.radius.powi(2);
         if kept <= (1.0 - LEAST_GAIN) * self.radius.powi(2) {
             self.split = Some(Box::new(parts));

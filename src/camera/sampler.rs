@@ -34,17 +34,105 @@ pub struct SampleKey {
     pub sampler: u32,
 }
 
-/// Four numbers in [0, 1), each uniformly distributed over seeds, for every index and total.
+/// The four numbers of one set, each in [0, 1) and uniformly distributed over seeds, computed when they are asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleSet {
+    key: SampleKey,
+    stream: u32,
+    /// `sobol`: the point's place in the sequence.
+    point: u32,
+    /// `sobol`: which of its four dimensions each number is.
+    order: [usize; 4],
+}
+
+impl SampleSet {
+    #[inline]
+    pub fn new(key: SampleKey, set_id: u32) -> Self {
+        let stream = hash_combine(hash_combine(key.seed, key.pixel), set_id);
+        // Set 0 needs both its pairs: dimensions 2 and 3 make the poorest plane of the four (10 to 25% more error at 8 to 25 samples of a
+        // blurred edge), so no pair holds both. The other sets have one pair that matters, and dimensions 0 and 1 make the best plane. An
+        // order of its own keeps the sets of one sample independent of each other.
+        let (point, order) = if set_id == 0 {
+            (key.index, [1, 3, 0, 2])
+        } else {
+            let seed = hash_u32(stream ^ 0x3c6e_f372);
+            let shuffled = owen_scramble(key.index.reverse_bits(), seed);
+            (shuffled.reverse_bits(), [0, 1, 2, 3])
+        };
+        Self {
+            key,
+            stream,
+            point,
+            order,
+        }
+    }
+
+    /// The first two: a point spread over the unit square.
+    #[inline]
+    pub fn pair(&self) -> [f32; 2] {
+        let bits = if self.is_grid() {
+            self.grid_pair(0)
+        } else {
+            [self.sobol(0), self.sobol(1)]
+        };
+        bits.map(uniform_from_bits)
+    }
+
+    /// The third.
+    #[inline]
+    pub fn third(&self) -> f32 {
+        uniform_from_bits(if self.is_grid() {
+            self.grid_pair(1)[0]
+        } else {
+            self.sobol(2)
+        })
+    }
+
+    /// The fourth.
+    #[inline]
+    pub fn fourth(&self) -> f32 {
+        uniform_from_bits(if self.is_grid() {
+            self.grid_pair(1)[1]
+        } else {
+            self.sobol(3)
+        })
+    }
+
+    fn is_grid(&self) -> bool {
+        matches!(self.key.sampler, SAMPLER_JITTERED | SAMPLER_CMJ)
+    }
+
+    /// One of the two pairs on a grid of at least `total` cells. Where the grid has more cells than samples, a permutation chooses which
+    /// stay empty, so that each sample alone is uniform over the whole square.
+    fn grid_pair(&self, pair: usize) -> [u32; 2] {
+        let samples = self.key.total.clamp(1, MAX_TOTAL);
+        let columns = strata_columns(samples);
+        let grid = Grid {
+            columns,
+            rows: samples.div_ceil(columns),
+            correlated: self.key.sampler == SAMPLER_CMJ,
+        };
+        let jitter = hash_combine(self.stream, self.key.index);
+        if pair == 0 {
+            grid.point(self.stream ^ 0x2c1b_3c6d, self.key.index, jitter)
+        } else {
+            let jitter = hash_u32(jitter ^ 0x6b43_a9b5);
+            grid.point(self.stream ^ 0x297a_2d39, self.key.index, jitter)
+        }
+    }
+
+    #[inline]
+    fn sobol(&self, number: usize) -> u32 {
+        let seed = hash_u32(self.stream ^ SOBOL_SEEDS[number]);
+        owen_scramble(sobol_reversed(self.point, self.order[number]), seed).reverse_bits()
+    }
+}
+
+/// All four numbers of a set.
 pub fn sample_4d(key: SampleKey, set_id: u32) -> [f32; 4] {
-    let stream = hash_combine(hash_combine(key.seed, key.pixel), set_id);
-    let bits = if key.sampler == SAMPLER_JITTERED {
-        stratified_4d(stream, key.index, key.total, false)
-    } else if key.sampler == SAMPLER_CMJ {
-        stratified_4d(stream, key.index, key.total, true)
-    } else {
-        sobol_4d(stream, key.index, set_id)
-    };
-    bits.map(uniform_from_bits)
+    let set = SampleSet::new(key, set_id);
+    let [x, y] = set.pair();
+    [x, y, set.third(), set.fourth()]
 }
 
 /// Columns of a grid of at least `total` cells, as square as possible: the smallest n with n * n >= total.
@@ -60,55 +148,33 @@ pub fn strata_columns(total: u32) -> u32 {
     n
 }
 
-/// Both pairs on a grid of at least `total` cells. Where the grid has more cells than samples, a permutation chooses which stay
-/// empty, so that each sample alone is uniform over the whole square.
-fn stratified_4d(stream: u32, index: u32, total: u32, correlated: bool) -> [u32; 4] {
-    let samples = total.clamp(1, MAX_TOTAL);
-    let columns = strata_columns(samples);
-    let rows = samples.div_ceil(columns);
-    let jitter = hash_combine(stream, index);
-    let a = stratified_pair(
-        stream ^ 0x2c1b_3c6d,
-        index,
-        columns,
-        rows,
-        jitter,
-        correlated,
-    );
-    let b = stratified_pair(
-        stream ^ 0x297a_2d39,
-        index,
-        columns,
-        rows,
-        hash_u32(jitter ^ 0x6b43_a9b5),
-        correlated,
-    );
-    [a.0, a.1, b.0, b.1]
-}
-
-fn stratified_pair(
-    stream: u32,
-    index: u32,
+/// Cells that share the unit square among a pixel's samples.
+struct Grid {
     columns: u32,
     rows: u32,
-    jitter: u32,
+    /// Each row and column of cells is stratified too.
     correlated: bool,
-) -> (u32, u32) {
-    let cells = columns * rows;
-    let cell = permute(index % cells, cells, hash_u32(stream ^ 0x8f74_39b1));
-    let column = cell % columns;
-    let row = cell / columns;
-    let mut x = hash_u32(jitter ^ 0x1b56_c4e9);
-    let mut y = hash_u32(jitter ^ 0xd2b7_4407);
-    if correlated {
-        x = in_stratum(permute(row, rows, hash_u32(stream ^ 0x51ed_270b)), rows, x);
-        y = in_stratum(
-            permute(column, columns, hash_u32(stream ^ 0x7d91_f2c3)),
-            columns,
-            y,
-        );
+}
+
+impl Grid {
+    fn point(&self, stream: u32, index: u32, jitter: u32) -> [u32; 2] {
+        let &Grid { columns, rows, .. } = self;
+        let cells = columns * rows;
+        let cell = permute(index % cells, cells, hash_u32(stream ^ 0x8f74_39b1));
+        let column = cell % columns;
+        let row = cell / columns;
+        let mut x = hash_u32(jitter ^ 0x1b56_c4e9);
+        let mut y = hash_u32(jitter ^ 0xd2b7_4407);
+        if self.correlated {
+            x = in_stratum(permute(row, rows, hash_u32(stream ^ 0x51ed_270b)), rows, x);
+            y = in_stratum(
+                permute(column, columns, hash_u32(stream ^ 0x7d91_f2c3)),
+                columns,
+                y,
+            );
+        }
+        [in_stratum(column, columns, x), in_stratum(row, rows, y)]
     }
-    (in_stratum(column, columns, x), in_stratum(row, rows, y))
 }
 
 /// (stratum + fraction / 2^32) / count in units of 2^-32, rounded down, by long division: float division may round differently on a
@@ -153,27 +219,8 @@ fn mix_masked(i: u32, key: u32, mask: u32, shift: u32) -> u32 {
     affine ^ (affine >> shift)
 }
 
-fn sobol_4d(stream: u32, index: u32, set_id: u32) -> [u32; 4] {
-    // An order of its own keeps the sets of one sample independent of each other.
-    let point = if set_id == 0 {
-        index
-    } else {
-        owen_scramble(index.reverse_bits(), hash_u32(stream ^ 0x3c6e_f372)).reverse_bits()
-    };
-    let sobol = sobol_reversed(point);
-    // Set 0 needs both its pairs: dimensions 2 and 3 make the poorest plane of the four (10 to 25% more error at 8 to 25 samples of a
-    // blurred edge), so no pair holds both. The other sets have one pair that matters, and dimensions 0 and 1 make the best plane.
-    let mut order = [0, 1, 2, 3];
-    if set_id == 0 {
-        order = [1, 3, 0, 2];
-    }
-    [
-        owen_scramble(sobol[order[0]], hash_u32(stream ^ 0xbb67_ae85)).reverse_bits(),
-        owen_scramble(sobol[order[1]], hash_u32(stream ^ 0x5be0_cd19)).reverse_bits(),
-        owen_scramble(sobol[order[2]], hash_u32(stream ^ 0xcbbb_9d5d)).reverse_bits(),
-        owen_scramble(sobol[order[3]], hash_u32(stream ^ 0x629a_292a)).reverse_bits(),
-    ]
-}
+/// Sets the scrambles of a set's four numbers apart.
+const SOBOL_SEEDS: [u32; 4] = [0xbb67_ae85, 0x5be0_cd19, 0xcbbb_9d5d, 0x629a_292a];
 
 /// Nested uniform scramble of a number whose most significant digit is bit 0: a bit is flipped by a hash of the seed and of the bits
 /// below it alone. Only xor with an even multiple, odd factors and sums carry upwards, so every step keeps that property
@@ -187,39 +234,44 @@ fn owen_scramble(x: u32, seed: u32) -> u32 {
     v ^ v.wrapping_mul(0x53a2_2864)
 }
 
-/// The first four Sobol dimensions of one point, each with its most significant bit in bit 0.
-fn sobol_reversed(point: u32) -> [u32; 4] {
-    // Dimension 1 is Pascal's triangle mod 2, a Kronecker power: five steps instead of 32 columns.
-    let mut pascal = point;
-    pascal ^= (pascal & 0xaaaa_aaaa) >> 1;
-    pascal ^= (pascal & 0xcccc_cccc) >> 2;
-    pascal ^= (pascal & 0xf0f0_f0f0) >> 4;
-    pascal ^= (pascal & 0xff00_ff00) >> 8;
-    pascal ^= pascal >> 16;
-    let mut third = 0;
-    let mut fourth = 0;
-    for (digit, sums) in SOBOL_23_DIGITS.iter().enumerate() {
-        let (sum_2, sum_3) = sums[(point >> (4 * digit)) as usize & 15];
-        third ^= sum_2;
-        fourth ^= sum_3;
+/// One of the first four Sobol dimensions of a point, its most significant bit in bit 0.
+#[inline]
+fn sobol_reversed(point: u32, dimension: usize) -> u32 {
+    match dimension {
+        0 => point,
+        // Pascal's triangle mod 2, a Kronecker power: five steps instead of 32 columns.
+        1 => {
+            let mut pascal = point;
+            pascal ^= (pascal & 0xaaaa_aaaa) >> 1;
+            pascal ^= (pascal & 0xcccc_cccc) >> 2;
+            pascal ^= (pascal & 0xf0f0_f0f0) >> 4;
+            pascal ^= (pascal & 0xff00_ff00) >> 8;
+            pascal ^ (pascal >> 16)
+        }
+        _ => {
+            let sums = &SOBOL_23_DIGITS[dimension - 2];
+            (0..8).fold(0, |sum, digit| {
+                sum ^ sums[digit][(point >> (4 * digit)) as usize & 15]
+            })
+        }
     }
-    [point, pascal, third, fourth]
 }
 
 /// Sums of the direction numbers of dimensions 2 and 3 over the bits of each hexadecimal digit: eight steps instead of 32.
-static SOBOL_23_DIGITS: [[(u32, u32); 16]; 8] = {
-    let mut sums = [[(0, 0); 16]; 8];
+static SOBOL_23_DIGITS: [[[u32; 16]; 8]; 2] = [digit_sums(&SOBOL_2), digit_sums(&SOBOL_3)];
+
+const fn digit_sums(numbers: &[u32; 32]) -> [[u32; 16]; 8] {
+    let mut sums = [[0; 16]; 8];
     let mut i = 0;
     while i < 8 * 16 * 4 {
         let (digit, value, bit) = (i / 64, i / 4 % 16, i % 4);
         if (value >> bit) & 1 == 1 {
-            sums[digit][value].0 ^= SOBOL_2[4 * digit + bit];
-            sums[digit][value].1 ^= SOBOL_3[4 * digit + bit];
+            sums[digit][value] ^= numbers[4 * digit + bit];
         }
         i += 1;
     }
     sums
-};
+}
 
 /// Direction numbers of dimension 2, bits reversed (Joe and Kuo 2008: polynomial x^2 + x + 1, m = 1 3).
 const SOBOL_2: [u32; 32] = [

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::state::*;
-use crate::camera::sampler::{SampleKey, sample_4d};
+use crate::camera::sampler::{SampleKey, SampleSet};
 use crate::packed::PackedScene;
 
 // Sample sets: 0 is pixel and lens, then five a depth from 7 on.
@@ -18,12 +18,12 @@ const FIRST_DEPTH_SET: u32 = 2;
 pub const ESTIMATOR_DIRECT: u32 = 0;
 pub const ESTIMATOR_PAPER: u32 = 1;
 
-/// Random numbers of one decision at the present vertex: the first and the last are good alone, the two between as a point of the square.
-pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> [f32; 4] {
+/// Random numbers of one decision at the present vertex, computed when asked for. The samplers spread the first pair of a set best: it is what
+/// directions and points on lights are found by.
+#[inline]
+pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> SampleSet {
     let set = FIRST_DEPTH_SET + st.depth * SETS_PER_DEPTH + purpose;
-    let [x, y, z, w] = sample_4d(sample_key(scene, st), set);
-    // The samplers spread x with y; what is drawn here chooses by its first number and finds a direction by the next two.
-    [z, x, y, w]
+    SampleSet::new(sample_key(scene, st), set)
 }
 
 pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {

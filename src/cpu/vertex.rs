@@ -4,10 +4,12 @@ use glam::Vec3;
 
 use super::contribution::*;
 use super::state::*;
+use crate::camera::sampler::SampleSet;
 use crate::light::cones::{
     Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
+    light_may_be_blocked,
 };
-use crate::light::lights::{LightSample, light_pdf_hit, light_sample};
+use crate::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 use crate::material::{
     Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample,
 };
@@ -177,7 +179,18 @@ fn next_event(
     } else {
         SET_PATH_LIGHT
     };
-    let l = light_sample(scene, s.position, draw(scene, st, set));
+    let u = draw(scene, st, set);
+    let mut index = 0;
+    if scene.frame.light_count > 1 {
+        index = light_select(scene, u.third(), u.fourth());
+    }
+    if difference
+        && scene.frame.flags & FRAME_BOTH_SHADOWS == 0
+        && !light_may_be_blocked(&scene.frame, &scene.lights[index as usize], s.position)
+    {
+        return;
+    }
+    let l = light_sample(scene, index, s.position, u.pair());
     let contribution = light_contribution(scene, st, s, wo, techniques, &l);
     if contribution != Vec3::ZERO {
         st.shadow_contribution = contribution;
@@ -242,6 +255,11 @@ fn plan_shadow(st: &mut PathState, s: &Surface, l: &LightSample) {
     st.pending |= PENDING_SHADOW;
 }
 
+/// Roulette by the last number of a set.
+fn plays(u: &SampleSet, probability: f32) -> bool {
+    probability >= 1.0 || u.fourth() < probability
+}
+
 /// (b): a direction inside the cones of the virtual bounding spheres. Those about the shading normal leave nothing out: Lambert's mirrored
 /// cosine is 0 under its horizon.
 fn plan_cone(
@@ -252,10 +270,10 @@ fn plan_cone(
     techniques: &Techniques,
 ) {
     let u = draw(scene, st, SET_DIFFERENCE_CONE);
-    if scene.frame.sphere_count == 0 || u[3] >= techniques.cone_probability {
+    if scene.frame.sphere_count == 0 || !plays(&u, techniques.cone_probability) {
         return;
     }
-    let c = cone_sample(&techniques.cones, [u[0], u[1], u[2]]);
+    let c = cone_sample(&techniques.cones, u.third(), u.pair());
     if c.pdf <= 0.0 {
         return;
     }
@@ -303,10 +321,16 @@ fn plan_continuation(
             SET_PATH_BSDF
         },
     );
-    if techniques.is_some_and(|t| u[3] >= t.bsdf_probability) {
+    if techniques.is_some_and(|t| !plays(&u, t.bsdf_probability)) {
         return;
     }
-    let b = bsdf_sample(s, wo, [u[0], u[1], u[2]]);
+    let lobe = if bsdf_is_lambertian(s) {
+        0.0
+    } else {
+        u.third()
+    };
+    let [x, y] = u.pair();
+    let b = bsdf_sample(s, wo, [lobe, x, y]);
     if !b.valid {
         return;
     }
@@ -330,7 +354,7 @@ fn plan_continuation(
     }
     if st.depth >= ROULETTE_FROM_DEPTH {
         let survival = (ROULETTE_GAIN * throughput.abs().max_element()).min(1.0);
-        if u[3] >= survival {
+        if !plays(&u, survival) {
             return;
         }
         throughput *= 1.0 / survival;

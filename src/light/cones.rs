@@ -5,10 +5,10 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use crate::math::{cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
-use crate::packed::{Frame, MAX_SPHERES};
+use crate::packed::{Frame, LIGHT_QUAD, Light, MAX_SPHERES};
 
 /// Cones with a squared sine above this are sampled as the hemisphere: uniform sampling would waste what lies below the horizon.
 const WIDE_SIN2: f32 = 0.5;
@@ -122,15 +122,15 @@ pub struct ConeSample {
     pub pdf: f32,
 }
 
-/// Draws a direction: u[0] chooses the sphere, u[1] and u[2] the direction.
-pub fn cone_sample(cones: &Cones, u: [f32; 3]) -> ConeSample {
+/// Draws a direction: `choice` chooses the sphere, `u` the direction.
+pub fn cone_sample(cones: &Cones, choice: f32, u: [f32; 2]) -> ConeSample {
     if cones.total <= 0.0 {
         return ConeSample {
             direction: cones.ns,
             pdf: 0.0,
         };
     }
-    let mut left = u[0] * cones.total;
+    let mut left = choice * cones.total;
     let mut chosen = cones.cones[0];
     for cone in cones.seen() {
         if cone.weight <= 0.0 {
@@ -142,14 +142,14 @@ pub fn cone_sample(cones: &Cones, u: [f32; 3]) -> ConeSample {
             break;
         }
     }
-    let mut cos = safe_sqrt(1.0 - u[1]);
-    let mut sin = safe_sqrt(u[1]);
+    let mut cos = safe_sqrt(1.0 - u[0]);
+    let mut sin = safe_sqrt(u[0]);
     if !chosen.wide {
-        let drop = u[1] * chosen.one_minus_cos;
+        let drop = u[0] * chosen.one_minus_cos;
         cos = 1.0 - drop;
         sin = safe_sqrt(drop * (2.0 - drop));
     }
-    let (sin_phi, cos_phi) = sincos_2pi(u[2]);
+    let (sin_phi, cos_phi) = sincos_2pi(u[1]);
     let (tangent, bitangent) = orthonormal_basis(chosen.axis);
     let direction = tangent * (sin * cos_phi) + bitangent * (sin * sin_phi) + chosen.axis * cos;
     ConeSample {
@@ -187,14 +187,47 @@ pub fn cone_solid_angle_fraction(cones: &Cones) -> f32 {
     cones.total.min(1.0)
 }
 
+/// Squared radius of a sphere about which a direction's rounding can say nothing certain.
+fn padded_radius_squared(radius: f32, distance_squared: f32) -> f32 {
+    radius * radius * (1.0 + SPHERE_PADDING) + distance_squared * SPHERE_PADDING_DISTANCE2
+}
+
+/// False only if no direction from `position` to a quad light meets a sphere (each lies outside one of the four planes through the point and
+/// an edge of the quad) or the quad shines to the other side. True for other lights. Costs a fraction of drawing a point on the light, which must then be turned down. (No twin:
+/// the shader's threads wait for one another.)
+pub fn light_may_be_blocked(frame: &Frame, light: &Light, position: Vec3) -> bool {
+    if light.kind != LIGHT_QUAD {
+        return true;
+    }
+    let [u, v] = [light.axis_u, light.axis_v].map(|[x, y, z, _]| Vec3::new(x, y, z));
+    let [x, y, z, _] = light.position;
+    let a = Vec3::new(x, y, z) - position;
+    // Outward normals, one plane a lane.
+    let (from, to) = ([a, a + u, a + u + v, a + v], [u, v, -u, -v]);
+    let lanes = |corners: [Vec3; 4], axis: usize| Vec4::from(corners.map(|c| c[axis]));
+    let [ax, ay, az] = [0, 1, 2].map(|axis| lanes(from, axis));
+    let [bx, by, bz] = [0, 1, 2].map(|axis| lanes(to, axis));
+    let (nx, ny, nz) = (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);
+    let normals_squared = nx * nx + ny * ny + nz * nz;
+    frame.spheres[..frame.sphere_count as usize]
+        .iter()
+        .any(|&[x, y, z, radius]| {
+            let to_centre = Vec3::new(x, y, z) - position;
+            let radius_squared = padded_radius_squared(radius, dot3(to_centre, to_centre));
+            let height = nx * to_centre.x + ny * to_centre.y + nz * to_centre.z;
+            let outside = height.cmpgt(Vec4::ZERO)
+                & (height * height).cmpgt(normals_squared * radius_squared);
+            !outside.any()
+        })
+}
+
 /// False only if a ray from `position` cannot meet virtual geometry.
 pub fn direction_meets_spheres(frame: &Frame, position: Vec3, direction: Vec3) -> bool {
     for i in 0..frame.sphere_count {
         let sphere = frame.spheres[i as usize];
         let to_centre = Vec3::new(sphere[0], sphere[1], sphere[2]) - position;
         let distance_squared = dot3(to_centre, to_centre);
-        let radius_squared = sphere[3] * sphere[3] * (1.0 + SPHERE_PADDING)
-            + distance_squared * SPHERE_PADDING_DISTANCE2;
+        let radius_squared = padded_radius_squared(sphere[3], distance_squared);
         if distance_squared <= radius_squared {
             return true;
         }

@@ -54,12 +54,12 @@ pub fn light_select(scene: &PackedScene, u: f32, coin: f32) -> u32 {
     }
 }
 
-/// Draws a light with u[0] and u[3] and a point on it with u[1], u[2]. There must be a light.
-pub fn light_sample(scene: &PackedScene, position: Vec3, u: [f32; 4]) -> LightSample {
-    let light = &scene.lights[light_select(scene, u[0], u[3]) as usize];
+/// Draws a point on a light that [`light_select`] chose.
+pub fn light_sample(scene: &PackedScene, index: u32, position: Vec3, u: [f32; 2]) -> LightSample {
+    let light = &scene.lights[index as usize];
     match light.kind {
         LIGHT_ENVIRONMENT => {
-            let s = env_sample(scene, u[1], u[2]);
+            let s = env_sample(scene, u[0], u[1]);
             LightSample {
                 direction: s.direction,
                 distance: f32::INFINITY,
@@ -78,7 +78,7 @@ pub fn light_sample(scene: &PackedScene, position: Vec3, u: [f32; 4]) -> LightSa
             side: light.side,
         },
         LIGHT_POINT | LIGHT_SPOT => sample_point_light(light, position),
-        _ => sample_area_light(scene, light, position, u[1], u[2]),
+        _ => sample_area_light(scene, light, position, u[0], u[1]),
     }
 }
 

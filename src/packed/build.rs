@@ -96,8 +96,6 @@ impl PackedScene {
         self.frame.sphere_count = spheres.len() as u32;
         self.frame.spheres = [[0.0; 4]; MAX_SPHERES];
         self.frame.spheres[..spheres.len()].copy_from_slice(&spheres);
-        self.frame.virtual_node_base = self.real_bvh.gpu_nodes().len() as u32;
-        self.frame.virtual_leaf_base = (self.real_bvh.gpu_leaves().len() / 3) as u32;
         let alpha = self
             .materials
             .iter()

@@ -243,7 +243,8 @@ fn sobol_points_follow_the_recurrence() {
                 .filter(|k| (point >> k) & 1 == 1)
                 .fold(0, |v, k| v ^ c[k])
         });
-        assert_eq!(sobol_reversed(point).map(u32::reverse_bits), want);
+        let found = [0, 1, 2, 3].map(|d| sobol_reversed(point, d).reverse_bits());
+        assert_eq!(found, want);
     }
 }
 

@@ -8,8 +8,9 @@ use glam::{DVec3, Vec3};
 use super::{Random, fit, pearson};
 use crate::light::cones::{
     Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
+    light_may_be_blocked,
 };
-use crate::packed::Frame;
+use crate::packed::{Frame, LIGHT_QUAD, Light};
 
 fn frame(spheres: &[[f32; 4]]) -> Frame {
     let mut frame = Frame::zeroed();
@@ -49,7 +50,11 @@ fn samples_follow_the_mixture() {
         let frame = frame(&spheres);
         let mut random = Random::new(21);
         let mut draw = || {
-            let s = cone_sample(&Cones::at(&frame, Vec3::ZERO, n), random.uniforms());
+            let s = cone_sample(
+                &Cones::at(&frame, Vec3::ZERO, n),
+                random.uniform(),
+                random.uniforms(),
+            );
             assert!(s.pdf > 0.0 && (s.direction.length() - 1.0).abs() < 1e-6);
             assert_eq!(
                 s.pdf,
@@ -92,7 +97,11 @@ fn tiny_cones_keep_their_distribution() {
         let mut random = Random::new(22);
         let mut counts = vec![0.0; 64];
         for _ in 0..64_000 {
-            let s = cone_sample(&Cones::at(&frame, Vec3::ZERO, Vec3::Y), random.uniforms());
+            let s = cone_sample(
+                &Cones::at(&frame, Vec3::ZERO, Vec3::Y),
+                random.uniform(),
+                random.uniforms(),
+            );
             let want = 1.0 / (TAU * one_minus_cos);
             assert!(
                 (f64::from(s.pdf) / want - 1.0).abs() < 1e-4,
@@ -131,7 +140,11 @@ fn a_sphere_covers_its_form_factor() {
         let n = 200_000;
         let mut sum = 0.0;
         for _ in 0..n {
-            let s = cone_sample(&Cones::at(&frame, Vec3::ZERO, Vec3::Y), random.uniforms());
+            let s = cone_sample(
+                &Cones::at(&frame, Vec3::ZERO, Vec3::Y),
+                random.uniform(),
+                random.uniforms(),
+            );
             let d = s.direction.as_dvec3();
             let c = DVec3::new(side.into(), height.into(), 0.0);
             let inside = d.cross(c).length() < f64::from(radius) && d.dot(c) > 0.0;
@@ -156,11 +169,11 @@ fn a_sphere_covers_its_form_factor() {
 fn only_cones_that_reach_above_the_horizon_count() {
     let above = |y: f32| {
         let frame = frame(&[[5.0, y, 0.0, 1.0]]);
-        cone_sample(&Cones::at(&frame, Vec3::ZERO, Vec3::Y), [0.5; 3]).pdf > 0.0
+        cone_sample(&Cones::at(&frame, Vec3::ZERO, Vec3::Y), 0.5, [0.5; 2]).pdf > 0.0
     };
     assert!(above(0.5) && above(-0.999) && !above(-1.01));
     assert_eq!(
-        cone_sample(&Cones::at(&frame(&[]), Vec3::ZERO, Vec3::Y), [0.5; 3]).pdf,
+        cone_sample(&Cones::at(&frame(&[]), Vec3::ZERO, Vec3::Y), 0.5, [0.5; 2]).pdf,
         0.0
     );
     assert_eq!(
@@ -207,4 +220,50 @@ fn no_ray_that_meets_a_sphere_is_turned_away() {
         }
     }
     assert!(refused > 100_000, "{refused}");
+}
+
+#[test]
+fn a_light_counts_as_unblocked_only_where_no_direction_to_it_meets_a_sphere() {
+    let mut random = Random::new(77);
+    let (mut turned_down, mut near_misses) = (0, 0);
+    for _ in 0..4000 {
+        let [x, z, width, depth, tilt, skew] = random.uniforms();
+        let light = Light {
+            position: [x - 0.5, 2.0, z - 0.5, 0.0],
+            axis_u: [0.2 + width, tilt - 0.5, 0.0, 0.0],
+            axis_v: [skew - 0.5, 0.0, 0.2 + depth, 0.0],
+            kind: LIGHT_QUAD,
+            ..Light::zeroed()
+        };
+        let mut spheres = vec![[0.0; 4]; 1 + (random.uniform() * 3.0) as usize];
+        for sphere in &mut spheres {
+            let [x, y, z, radius] = random.uniforms();
+            *sphere = [4.0 * x - 2.0, 2.5 * y, 4.0 * z - 2.0, 0.02 + 0.4 * radius];
+        }
+        let frame = frame(&spheres);
+        let [x, z] = random.uniforms();
+        let position = Vec3::new(4.0 * x - 2.0, 0.0, 4.0 * z - 2.0);
+        let [corner, u, v] =
+            [light.position, light.axis_u, light.axis_v].map(|[x, y, z, _]| Vec3::new(x, y, z));
+        if u.cross(v).dot(position - corner) <= 0.0 {
+            continue;
+        }
+        let blocked = (0..256)
+            .filter(|_| {
+                let [a, b] = random.uniforms();
+                let direction = (corner + u * a + v * b - position).normalize();
+                direction_meets_spheres(&frame, position, direction)
+            })
+            .count();
+        let may = light_may_be_blocked(&frame, &light, position);
+        assert!(may || blocked == 0, "{spheres:?} {light:?} {position}");
+        turned_down += usize::from(!may);
+        near_misses += usize::from(may && blocked == 0);
+    }
+    // It is worth its time, and rarely too careful.
+    assert!(turned_down > 1000, "{turned_down}");
+    assert!(
+        near_misses < turned_down / 2,
+        "{near_misses} of {turned_down}"
+    );
 }

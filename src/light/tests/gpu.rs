@@ -17,7 +17,7 @@ const BODY: &str = "
 let position = input_vec3(0u);
 let direction = input_vec3(3u);
 let u = vec4<f32>(input_f32(6u), input_f32(7u), input_f32(8u), input_f32(9u));
-let s = light_sample(position, u);
+let s = light_sample(light_select(u.x, u.w), position, u.yz);
 output_vec3(0u, s.direction);
 output_f32(3u, s.distance);
 output_vec3(4u, s.radiance);
@@ -44,10 +44,10 @@ fn on_the_cpu(scene: &PackedScene, input: &[f32]) -> [f32; OUTPUTS] {
     let direction = Vec3::from_slice(&input[3..6]);
     let u = [input[6], input[7], input[8], input[9]];
     let frame = &scene.frame;
-    let s = light_sample(scene, position, u);
-    let c = cone_sample(&Cones::at(frame, position, direction), [u[0], u[1], u[2]]);
-    let radiance = env_radiance(scene, direction);
     let light = light_select(scene, u[0], u[3]);
+    let s = light_sample(scene, light, position, [u[1], u[2]]);
+    let c = cone_sample(&Cones::at(frame, position, direction), u[0], [u[1], u[2]]);
+    let radiance = env_radiance(scene, direction);
     [
         s.direction.x,
         s.direction.y,
