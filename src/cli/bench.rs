@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::render::{above_zero, choice};
-use super::{Failure, Outcome, interrupt, print, progress, say, stress};
+use super::{Failure, Outcome, growth, interrupt, print, progress, say, stress};
 use crate::output::{write_bytes, write_text};
 use crate::renderer::Skip;
 use crate::report::{
-    Axis, FORMAT, Machine, Method, PAPER_SCENE, PaperRow, Plan, Plot, Reach, ReferenceGoal, Report,
-    Row, Shot, Source, Target, Truth, Verdict, against, cost_to_reach, csv, gpu_time,
+    Axis, FORMAT, Law, Machine, Method, PAPER_SCENE, PaperRow, Plan, Plot, Reach, ReferenceGoal,
+    Report, Row, Shot, Source, Target, Truth, Verdict, against, cost_to_reach, csv, gpu_time,
     gpu_time_markdown, gpu_time_text, log_log_slope, markdown, measure, page, paper_markdown,
     paper_rays_per_pixel, paper_rows, paper_text, picture_png, plots, reference, replace_section,
     shrink, text,
@@ -28,7 +28,7 @@ use crate::scene::{
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Scene files
-    #[arg(required_unless_present_any = ["paper_table", "report", "stress"])]
+    #[arg(required_unless_present_any = ["paper_table", "report", "stress", "growth"])]
     scenes: Vec<PathBuf>,
     /// Folder to write
     #[arg(short, long, value_name = "DIR", default_value = "bench")]
@@ -95,7 +95,12 @@ pub(super) struct Arguments {
     /// Where the time of a GPU render goes, kernel by kernel, at each number of rays per pixel. Writes gpu-time.json
     #[arg(long, conflicts_with_all = ["reference", "target_rmse", "against", "ablate", "report", "paper_table", "stress"])]
     gpu_time: bool,
-    /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->, <!-- stress -->, <!-- gpu-time -->) and
+    /// How the cost grows with triangles, pixels, rays, objects and lights: the exponent of each, beside what is expected; minutes.
+    /// Writes growth.json, .csv and plots
+    #[arg(long, value_name = "WHAT,WHAT", num_args = 0.., require_equals = true, value_delimiter = ',', value_parser = choice::<Law>(),
+        conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate", "filter", "report", "paper_table", "stress", "gpu_time"])]
+    growth: Option<Vec<Law>>,
+    /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->, <!-- stress -->, <!-- gpu-time -->, <!-- growth -->) and
     /// <!-- end -->
     #[arg(long, value_name = "FILE")]
     write_docs: Option<PathBuf>,
@@ -130,6 +135,8 @@ impl Arguments {
         }
         let section = if self.stress {
             "stress"
+        } else if self.growth.is_some() {
+            "growth"
         } else if self.paper_table {
             "paper-table"
         } else if self.gpu_time {
@@ -260,9 +267,22 @@ impl Docs {
 }
 
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
-    if job.arguments.stress {
+    if job.arguments.stress || job.arguments.growth.is_some() {
         job.make_folder()?;
-        let (outcome, table) = stress::run(&job.arguments.output, &job.machine, &command_line())?;
+        let (folder, command) = (&job.arguments.output, command_line());
+        let (outcome, table) = match &job.arguments.growth {
+            Some(laws) => {
+                let about = (&job.empty_report().machine, command.as_str());
+                growth::run(
+                    laws,
+                    &job.plan(Vec::new()),
+                    job.arguments.shrink,
+                    folder,
+                    about,
+                )?
+            }
+            None => stress::run(folder, &job.machine, &command)?,
+        };
         if let Some(docs) = &job.docs
             && outcome != Outcome::Interrupted
         {

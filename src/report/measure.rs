@@ -6,6 +6,7 @@ use cpu_time::ProcessTime;
 
 use super::{Errors, Method, Row, Run, Truth};
 use crate::film::Picture;
+use crate::packed::PackError;
 use crate::renderer::{Budget, RayTotals, RenderError, Renderer, RendererOptions, StatsRays};
 use crate::scene::{BackendChoice, Scene};
 
@@ -22,10 +23,21 @@ pub struct Plan {
     pub hardware_gpu: bool,
 }
 
+impl Plan {
+    /// A method's cost is seconds on the clock, not of the processor.
+    pub(super) fn times_by_wall(&self, method: Method) -> bool {
+        self.hardware_gpu && method.backend == BackendChoice::Gpu
+    }
+}
+
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     #[error(transparent)]
     Render(#[from] RenderError),
+    #[error(transparent)]
+    Pack(#[from] PackError),
+    #[error("there is no thread to measure on: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     #[error("{method} was asked for, but {reason}")]
     Replaced { method: String, reason: String },
     #[error("the picture has {0}x{1} pixels, its reference {2}x{3}")]
@@ -113,7 +125,8 @@ pub fn measure<'a>(
         for (level, &rays_per_pixel) in plan.rays_per_pixel.iter().enumerate() {
             let samples = &cells[level * subjects.len() + at];
             if !samples.is_empty() {
-                rows.push(subject.row(rays_per_pixel, samples, plan.hardware_gpu));
+                let by_wall = plan.times_by_wall(subject.method);
+                rows.push(subject.row(rays_per_pixel, samples, by_wall));
             }
         }
     }
@@ -122,19 +135,19 @@ pub fn measure<'a>(
 
 /// One run.
 #[derive(Clone, Debug)]
-struct Sample {
+pub(super) struct Sample {
     seed: u32,
-    wall_secs: f64,
+    pub wall_secs: f64,
     setup_secs: f64,
-    cpu_secs: f64,
-    rays: RayTotals,
+    pub cpu_secs: f64,
+    pub rays: RayTotals,
     skipped_fraction: f64,
     non_finite: u64,
     errors: Errors,
 }
 
 /// A method with its renderer, which stays built between runs.
-struct Subject {
+pub(super) struct Subject {
     method: Method,
     renderer: Renderer,
     build_secs: f64,
@@ -142,7 +155,7 @@ struct Subject {
 }
 
 impl Subject {
-    fn new(scene: &Scene, method: Method) -> Result<Self, RenderError> {
+    pub(super) fn new(scene: &Scene, method: Method) -> Result<Self, RenderError> {
         let mut scene = scene.clone();
         let settings = &mut scene.settings;
         settings.backend = method.backend;
@@ -165,7 +178,7 @@ impl Subject {
     }
 
     /// A lost device is replaced by the CPU, which is right for a render and wrong for its time.
-    fn check_backend(&self) -> Result<(), MeasureError> {
+    pub(super) fn check_backend(&self) -> Result<(), MeasureError> {
         let asked_for_gpu = self.method.backend == BackendChoice::Gpu;
         if asked_for_gpu && self.renderer.backend_name() != "gpu" {
             return Err(MeasureError::Replaced {
@@ -176,7 +189,11 @@ impl Subject {
         Ok(())
     }
 
-    fn render(
+    pub(super) fn device(&self) -> String {
+        self.renderer.device_name()
+    }
+
+    pub(super) fn render(
         &mut self,
         rays_per_pixel: u32,
         seed: u32,
@@ -204,7 +221,7 @@ impl Subject {
         Ok((sample, picture))
     }
 
-    fn row(&self, rays_per_pixel: u32, samples: &[Sample], hardware_gpu: bool) -> Row {
+    fn row(&self, rays_per_pixel: u32, samples: &[Sample], by_wall: bool) -> Row {
         let values = |pick: fn(&Sample) -> f64| samples.iter().map(pick).collect::<Vec<f64>>();
         let wall = values(|s| s.wall_secs);
         let cpu = values(|s| s.cpu_secs);
@@ -213,7 +230,6 @@ impl Subject {
         let traced = rays.mixed + rays.real + rays.mixed_shadow + rays.real_shadow;
         let errors = Errors::mean(&samples.iter().map(|s| s.errors).collect::<Vec<_>>());
         let (wall_secs, cpu_secs) = (mean(&wall), mean(&cpu));
-        let by_wall = hardware_gpu && self.method.backend == BackendChoice::Gpu;
         let cost_secs = if by_wall { wall_secs } else { cpu_secs };
         let product = cost_secs * errors.all.mse;
         let film = self.renderer.film();
