@@ -8,8 +8,6 @@
 
 #[path = "support/cpu_time.rs"]
 mod cpu_time;
-#[path = "support/half_size.rs"]
-mod half_size;
 
 use std::path::{Path, PathBuf};
 
@@ -234,7 +232,8 @@ fn worth(root: &Path) -> Result<String, Failure> {
          | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for name in SCENES {
-        let scene = half_size::of(mixray::scene::load(&scene_file(root, name))?);
+        let mut scene = shrink(mixray::scene::load(&scene_file(root, name))?, 2);
+        scene.settings.backend = BackendChoice::Cpu;
         let reference = by_rays(
             &scene,
             WORTH_REFERENCE_RAYS,

@@ -7,6 +7,7 @@ mod antialias;
 mod bench;
 mod cartoon;
 mod compare;
+mod growth;
 mod info;
 mod interrupt;
 mod layers;

@@ -2,8 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Least-squares slope of log y over log x; points that are not above 0 are left out. `None` with fewer than two different x.
-pub fn log_log_slope(points: &[(f64, f64)]) -> Option<f64> {
+/// A straight line in log over log.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fit {
+    /// The exponent of the power law.
+    pub slope: f64,
+    /// Of the slope, from the scatter of the points about the line; `None` of two points, which have none.
+    pub standard_error: Option<f64>,
+}
+
+/// Least squares of log y over log x; points that are not above 0 are left out. `None` with fewer than two different x.
+pub fn log_log_fit(points: &[(f64, f64)]) -> Option<Fit> {
     let logs: Vec<(f64, f64)> = points
         .iter()
         .filter(|(x, y)| *x > 0.0 && *y > 0.0)
@@ -14,7 +23,21 @@ pub fn log_log_slope(points: &[(f64, f64)]) -> Option<f64> {
     let mean_y = logs.iter().map(|p| p.1).sum::<f64>() / count;
     let spread: f64 = logs.iter().map(|p| (p.0 - mean_x).powi(2)).sum();
     let together: f64 = logs.iter().map(|p| (p.0 - mean_x) * (p.1 - mean_y)).sum();
-    (logs.len() > 1 && spread > 0.0).then(|| together / spread)
+    if logs.len() < 2 || spread <= 0.0 {
+        return None;
+    }
+    let slope = together / spread;
+    let residual = |(x, y): &(f64, f64)| y - mean_y - slope * (x - mean_x);
+    let squares: f64 = logs.iter().map(|p| residual(p).powi(2)).sum();
+    Some(Fit {
+        slope,
+        standard_error: (logs.len() > 2).then(|| (squares / (count - 2.0) / spread).sqrt()),
+    })
+}
+
+/// The slope of [`log_log_fit`].
+pub fn log_log_slope(points: &[(f64, f64)]) -> Option<f64> {
+    log_log_fit(points).map(|fit| fit.slope)
 }
 
 /// What it takes to bring an error down to a target.
@@ -75,6 +98,30 @@ mod tests {
         );
         assert_eq!(log_log_slope(&[(1.0, 1.0)]), None);
         assert_eq!(log_log_slope(&[(1.0, 1.0), (1.0, 2.0)]), None);
+    }
+
+    #[test]
+    fn the_standard_error_is_the_spread_of_slopes() {
+        // Slopes of laws with scatter added anew must spread as each one's own standard error says.
+        let mut random = crate::stress::meshes::Random(5);
+        let (mut slopes, mut stated) = (Vec::new(), 0.0);
+        for _ in 0..4000 {
+            // Sum of 12 uniform numbers: nearly normal, variance 1.
+            let mut normal = || (0..12).map(|_| f64::from(random.unit())).sum::<f64>() - 6.0;
+            let points = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0]
+                .map(|x: f64| (x, x.powf(0.3) * (0.05 * normal()).exp()));
+            let fit = log_log_fit(&points).unwrap();
+            slopes.push(fit.slope);
+            stated += fit.standard_error.unwrap().powi(2) / 4000.0;
+        }
+        let mean = slopes.iter().sum::<f64>() / 4000.0;
+        let spread = slopes.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / 3999.0;
+        assert!((mean - 0.3).abs() < 1e-3, "{mean}");
+        assert!((stated / spread - 1.0).abs() < 0.1, "{}", stated / spread);
+
+        let exact = [(1.0, 2.0), (2.0, 4.0), (4.0, 8.0)];
+        assert!(log_log_fit(&exact).unwrap().standard_error.unwrap() < 1e-12);
+        assert_eq!(log_log_fit(&exact[..2]).unwrap().standard_error, None);
     }
 
     #[test]

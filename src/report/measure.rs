@@ -6,6 +6,7 @@ use cpu_time::ProcessTime;
 
 use super::{Errors, Method, Row, Run, Truth};
 use crate::film::Picture;
+use crate::packed::PackError;
 use crate::renderer::{Budget, RayTotals, RenderError, Renderer, RendererOptions, StatsRays};
 use crate::scene::{BackendChoice, Scene};
 
@@ -36,12 +37,21 @@ impl Plan {
         let of = |method| 1 + u64::from(self.repeats) * self.levels(method) as u64;
         self.methods.iter().map(of).sum()
     }
+
+    /// A method's cost is seconds on the clock, not of the processor.
+    pub(super) fn times_by_wall(&self, method: Method) -> bool {
+        self.hardware_gpu && method.backend == BackendChoice::Gpu
+    }
 }
 
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     #[error(transparent)]
     Render(#[from] RenderError),
+    #[error(transparent)]
+    Pack(#[from] PackError),
+    #[error("there is no thread to measure on: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     #[error("{method} was asked for, but {reason}")]
     Replaced { method: String, reason: String },
     #[error("the picture has {0}x{1} pixels, its reference {2}x{3}")]
@@ -136,7 +146,8 @@ pub fn measure<'a>(
             let samples = &cells[level * subjects.len() + at];
             if !samples.is_empty() {
                 let rays_per_pixel = subject.limit().unwrap_or(rays_per_pixel);
-                rows.push(subject.row(rays_per_pixel, samples, plan.hardware_gpu));
+                let by_wall = plan.times_by_wall(subject.method);
+                rows.push(subject.row(rays_per_pixel, samples, by_wall));
             }
         }
     }
@@ -172,12 +183,12 @@ fn check_size(picture: &Picture, truth: &Truth) -> Result<(), MeasureError> {
 
 /// One run.
 #[derive(Clone, Debug)]
-struct Sample {
+pub(super) struct Sample {
     seed: u32,
-    wall_secs: f64,
+    pub wall_secs: f64,
     setup_secs: f64,
-    cpu_secs: f64,
-    rays: RayTotals,
+    pub cpu_secs: f64,
+    pub rays: RayTotals,
     skipped_fraction: f64,
     non_finite: u64,
     errors: Errors,
@@ -185,7 +196,7 @@ struct Sample {
 }
 
 /// A method with its renderer, which stays built between runs.
-struct Subject {
+pub(super) struct Subject {
     method: Method,
     renderer: Renderer,
     /// Rays per pixel of the scene file, which a render to a goal begins from.
@@ -195,7 +206,7 @@ struct Subject {
 }
 
 impl Subject {
-    fn new(scene: &Scene, method: Method) -> Result<Self, RenderError> {
+    pub(super) fn new(scene: &Scene, method: Method) -> Result<Self, RenderError> {
         let mut scene = scene.clone();
         let settings = &mut scene.settings;
         settings.backend = method.backend;
@@ -219,7 +230,7 @@ impl Subject {
     }
 
     /// A lost device is replaced by the CPU, which is right for a render and wrong for its time.
-    fn check_backend(&self) -> Result<(), MeasureError> {
+    pub(super) fn check_backend(&self) -> Result<(), MeasureError> {
         let asked_for_gpu = self.method.backend == BackendChoice::Gpu;
         if asked_for_gpu && self.renderer.backend_name() != "gpu" {
             return Err(MeasureError::Replaced {
@@ -230,13 +241,17 @@ impl Subject {
         Ok(())
     }
 
+    pub(super) fn device(&self) -> String {
+        self.renderer.device_name()
+    }
+
     /// With a goal: the rays per pixel after which it is given up.
     fn limit(&self) -> Option<u32> {
         self.method.goal.map(|goal| goal.max_rays_per_pixel)
     }
 
     /// `rays_per_pixel`: `None` to the method's goal.
-    fn run(
+    pub(super) fn run(
         &mut self,
         rays_per_pixel: Option<u32>,
         seed: u32,
@@ -273,7 +288,7 @@ impl Subject {
         Ok((sample, picture))
     }
 
-    fn row(&self, rays_per_pixel: u32, samples: &[Sample], hardware_gpu: bool) -> Row {
+    fn row(&self, rays_per_pixel: u32, samples: &[Sample], by_wall: bool) -> Row {
         let values = |pick: fn(&Sample) -> f64| samples.iter().map(pick).collect::<Vec<f64>>();
         let wall = values(|s| s.wall_secs);
         let cpu = values(|s| s.cpu_secs);
@@ -282,7 +297,6 @@ impl Subject {
         let traced = rays.mixed + rays.real + rays.mixed_shadow + rays.real_shadow;
         let errors = Errors::mean(&samples.iter().map(|s| s.errors).collect::<Vec<_>>());
         let (wall_secs, cpu_secs) = (mean(&wall), mean(&cpu));
-        let by_wall = hardware_gpu && self.method.backend == BackendChoice::Gpu;
         let cost_secs = if by_wall { wall_secs } else { cpu_secs };
         let product = cost_secs * errors.all.mse;
         let film = self.renderer.film();

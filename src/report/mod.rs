@@ -4,11 +4,13 @@
 //! make tables, plots and a page of it or compare it with an earlier one.
 
 mod against;
+mod chart;
 mod docs;
 mod errors;
 mod fit;
 mod goal;
 mod gpu_time;
+mod growth;
 mod machine;
 mod measure;
 mod page;
@@ -23,9 +25,10 @@ pub(crate) mod table;
 pub use against::{Change, Verdict, against};
 pub use docs::replace_section;
 pub use errors::{Errors, Figures, Truth};
-pub use fit::{Reach, cost_to_reach, log_log_slope};
+pub use fit::{Fit, Reach, cost_to_reach, log_log_fit, log_log_slope};
 pub use goal::{Aim, Goal};
 pub use gpu_time::{GpuTime, gpu_time, gpu_time_markdown, gpu_time_text};
+pub use growth::{Curve, Law, Point, grow, growth_csv, growth_markdown, growth_plot, growth_text};
 pub use machine::Machine;
 pub use measure::{MeasureError, Plan, Shot, measure, rmse_of};
 pub use page::page;

@@ -1,35 +1,7 @@
 //! Error against time and against rays per pixel, log over log, a line a method: SVG and PNG.
 
-use std::sync::Once;
-
-use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};
-use plotters::prelude::*;
-use plotters::style::{FontStyle, register_font};
-
-use super::pictures::png;
+use super::chart::{Chart, Guide, Legend, padded, ticks, ticks_at};
 use super::{Report, Row};
-
-/// DejaVu Sans (font/LICENSE), so that no font of the system is needed.
-static FONT: &[u8] = include_bytes!("font/DejaVuSans-subset.ttf");
-const FONT_NAME: &str = "sans-serif";
-
-const WIDTH: u32 = 800;
-const HEIGHT: u32 = 520;
-/// Pixels of the PNG for one of the SVG, and again as many are averaged for smooth lines.
-const PNG_SCALE: u32 = 2;
-const SMOOTHING: u32 = 2;
-
-/// Colours that colour-blind readers tell apart (Okabe and Ito, 2008).
-const COLOURS: [RGBColor; 8] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 0, 0),
-    RGBColor(160, 160, 40),
-];
 
 /// What stands along the bottom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,7 +39,7 @@ pub fn plots(report: &Report) -> Result<Vec<Plot>, PlotError> {
         let by_rays = report.rows.iter().filter(|r| r.method.goal.is_none());
         let rows: Vec<&Row> = by_rays.filter(|r| r.scene == scene).collect();
         for axis in [Axis::Secs, Axis::RaysPerPixel] {
-            if let Some(chart) = Chart::of(&rows, axis) {
+            if let Some(chart) = chart_of(&rows, axis) {
                 let (svg, png) = chart.render().map_err(|reason| PlotError {
                     scene: scene.to_owned(),
                     reason,
@@ -85,274 +57,63 @@ pub fn plots(report: &Report) -> Result<Vec<Plot>, PlotError> {
     Ok(plots)
 }
 
-/// Base-10 logarithms throughout.
-struct Chart {
-    title: String,
-    x_label: String,
-    x_ticks: Vec<f64>,
-    y_ticks: Vec<f64>,
-    x_range: (f64, f64),
-    y_range: (f64, f64),
-    lines: Vec<(String, Vec<(f64, f64)>)>,
-    /// Falls as independent samples do: an error of one over the root of the rays.
-    guide: Option<[(f64, f64); 2]>,
-}
-
-impl Chart {
-    fn of(rows: &[&Row], axis: Axis) -> Option<Self> {
-        let first = rows.first()?;
-        let by_wall = rows.iter().any(|r| r.cost == "wall");
-        let x_of = |row: &Row| match axis {
-            Axis::RaysPerPixel => f64::from(row.rays_per_pixel),
-            Axis::Secs if by_wall => row.wall_secs,
-            Axis::Secs => row.cpu_secs,
-        };
-        let mut lines: Vec<(String, Vec<(f64, f64)>)> = Vec::new();
-        for row in rows {
-            let (x, y) = (x_of(row), row.errors.all.rmse);
-            if x <= 0.0 || y <= 0.0 {
-                continue;
-            }
-            let (label, point) = (row.method.label(), (x.log10(), y.log10()));
-            match lines.iter_mut().find(|(known, _)| *known == label) {
-                Some((_, points)) => points.push(point),
-                None => lines.push((label, vec![point])),
-            }
-        }
-        let points = || lines.iter().flat_map(|(_, points)| points);
-        let x_range = padded(points().map(|p| p.0))?;
-        let y_range = padded(points().map(|p| p.1))?;
-        let x_ticks = match axis {
-            Axis::RaysPerPixel => {
-                let mut ticks: Vec<f64> = points().map(|p| p.0).collect();
-                ticks.sort_by(f64::total_cmp);
-                ticks.dedup();
-                ticks
-            }
-            Axis::Secs => ticks(x_range),
-        };
-        let guide = (axis == Axis::RaysPerPixel).then(|| {
-            let top = points().map(|p| p.1 + 0.5 * p.0).fold(f64::MIN, f64::max);
-            [x_range.0, x_range.1].map(|x| (x, top - 0.5 * x))
-        });
-        Some(Self {
-            title: format!("{}, {} x {}", first.scene, first.width, first.height),
-            x_label: match axis {
-                Axis::RaysPerPixel => "rays per pixel".to_owned(),
-                Axis::Secs if by_wall => format!("seconds on the clock, {}", first.device),
-                Axis::Secs => "processor seconds, all threads".to_owned(),
-            },
-            x_ticks,
-            y_ticks: ticks(y_range),
-            x_range,
-            y_range,
-            lines,
-            guide,
-        })
-    }
-
-    fn render(&self) -> Result<(String, Vec<u8>), String> {
-        static REGISTERED: Once = Once::new();
-        let mut usable = true;
-        REGISTERED.call_once(|| {
-            usable = register_font(FONT_NAME, FontStyle::Normal, FONT).is_ok();
-        });
-        if !usable {
-            return Err("its font cannot be used".to_owned());
-        }
-        let mut svg = String::new();
-        self.draw(SVGBackend::with_string(&mut svg, (WIDTH, HEIGHT)), 1)
-            .map_err(|e| e.to_string())?;
-
-        let fine = PNG_SCALE * SMOOTHING;
-        let (width, height) = (WIDTH * fine, HEIGHT * fine);
-        let mut pixels = vec![255u8; width as usize * height as usize * 3];
-        self.draw(
-            BitMapBackend::with_buffer(&mut pixels, (width, height)),
-            fine,
-        )
-        .map_err(|e| e.to_string())?;
-        let smooth = average(&pixels, width as usize, SMOOTHING as usize);
-        let png = png(&smooth, WIDTH * PNG_SCALE, HEIGHT * PNG_SCALE).map_err(|e| e.to_string())?;
-        Ok((svg, png))
-    }
-
-    /// `scale`: pixels of this backend for one of the SVG.
-    fn draw<B: DrawingBackend>(
-        &self,
-        backend: B,
-        scale: u32,
-    ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
-        let font = |px: u32| (FONT_NAME, px * scale);
-        let area = backend.into_drawing_area();
-        area.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&area)
-            .caption(&self.title, font(18))
-            .margin(10 * scale)
-            .x_label_area_size(42 * scale)
-            .y_label_area_size(64 * scale)
-            .build_cartesian_2d(
-                LogAxis::new(self.x_range, &self.x_ticks),
-                LogAxis::new(self.y_range, &self.y_ticks),
-            )?;
-        chart
-            .configure_mesh()
-            .x_desc(&self.x_label)
-            .y_desc("RMSE, linear")
-            .x_labels(self.x_ticks.len().max(2))
-            .y_labels(self.y_ticks.len().max(2))
-            .x_label_formatter(&|x| tick_label(*x))
-            .y_label_formatter(&|y| tick_label(*y))
-            .bold_line_style(RGBColor(225, 225, 225).stroke_width(scale))
-            .light_line_style(TRANSPARENT)
-            .label_style(font(13))
-            .axis_desc_style(font(14))
-            .draw()?;
-        if let Some(guide) = self.guide {
-            let style = RGBColor(150, 150, 150).stroke_width(scale);
-            let size = 5 * scale;
-            chart
-                .draw_series(DashedLineSeries::new(guide, size, size, style))?
-                .label("slope -1/2: independent samples")
-                .legend(move |(x, y)| {
-                    PathElement::new([(x, y), (x + 18 * scale as i32, y)], style)
-                });
-        }
-        for (number, (label, points)) in self.lines.iter().enumerate() {
-            let colour = COLOURS[number % COLOURS.len()];
-            let style = colour.stroke_width(2 * scale);
-            chart
-                .draw_series(LineSeries::new(points.iter().copied(), style))?
-                .label(label)
-                .legend(move |(x, y)| {
-                    PathElement::new([(x, y), (x + 18 * scale as i32, y)], style)
-                });
-            let dots = points
-                .iter()
-                .map(|point| Circle::new(*point, 4 * scale, colour.filled()));
-            chart.draw_series(dots)?;
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .margin(8 * scale)
-            .legend_area_size(24 * scale)
-            .background_style(WHITE.mix(0.85))
-            .border_style(RGBColor(200, 200, 200).stroke_width(scale))
-            .label_font(font(13))
-            .draw()?;
-        area.present()
-    }
-}
-
-/// An axis of logarithms with lines just where the ticks are.
-struct LogAxis {
-    range: (f64, f64),
-    ticks: Vec<f64>,
-}
-
-impl LogAxis {
-    fn new(range: (f64, f64), ticks: &[f64]) -> Self {
-        let ticks = ticks.to_vec();
-        Self { range, ticks }
-    }
-}
-
-impl Ranged for LogAxis {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        let share = (value - self.range.0) / (self.range.1 - self.range.0);
-        limit.0 + (f64::from(limit.1 - limit.0) * share).round() as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, _hint: Hint) -> Vec<f64> {
-        self.ticks.clone()
-    }
-
-    fn range(&self) -> std::ops::Range<f64> {
-        self.range.0..self.range.1
-    }
-}
-
-/// A little more than the values span; `None` of none.
-fn padded(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
-    let low = values.clone().fold(f64::INFINITY, f64::min);
-    let high = values.fold(f64::NEG_INFINITY, f64::max);
-    let pad = (0.06 * (high - low)).max(0.05);
-    low.is_finite().then_some((low - pad, high + pad))
-}
-
-/// Where 1, 2 and 5 times powers of ten lie, thinned to powers of ten where those are many.
-fn ticks(range: (f64, f64)) -> Vec<f64> {
-    let digits: &[f64] = match range.1 - range.0 {
-        span if span < 0.4 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0],
-        span if span < 4.0 => &[1.0, 2.0, 5.0],
-        _ => &[1.0],
+/// Without a point above 0 there is none.
+fn chart_of(rows: &[&Row], axis: Axis) -> Option<Chart> {
+    let first = rows.first()?;
+    let by_wall = rows.iter().any(|r| r.cost == "wall");
+    let x_of = |row: &Row| match axis {
+        Axis::RaysPerPixel => f64::from(row.rays_per_pixel),
+        Axis::Secs if by_wall => row.wall_secs,
+        Axis::Secs => row.cpu_secs,
     };
-    let decades = range.0.floor() as i32..=range.1.floor() as i32;
-    decades
-        .flat_map(|decade| digits.iter().map(move |d| d.log10() + f64::from(decade)))
-        .filter(|tick| (range.0..=range.1).contains(tick))
-        .collect()
-}
-
-/// 10 to the `log`, short.
-fn tick_label(log: f64) -> String {
-    let value = 10f64.powf(log);
-    if !(1e-3..1e5).contains(&value) {
-        return format!("{value:.1e}").replace(".0e", "e");
-    }
-    let decimals = (2.0 - log).floor().clamp(0.0, 5.0) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
-    }
-}
-
-/// Means of `side` x `side` pixels, RGB.
-fn average(pixels: &[u8], width: usize, side: usize) -> Vec<u8> {
-    let height = pixels.len() / 3 / width;
-    let mut out = Vec::with_capacity(pixels.len() / (side * side));
-    for y in 0..height / side {
-        for x in 0..width / side {
-            for c in 0..3 {
-                let sum: usize = (0..side * side)
-                    .map(|i| {
-                        let (row, column) = (y * side + i / side, x * side + i % side);
-                        usize::from(pixels[3 * (row * width + column) + c])
-                    })
-                    .sum();
-                out.push(((sum + side * side / 2) / (side * side)) as u8);
-            }
+    let mut lines: Vec<(String, Vec<(f64, f64)>)> = Vec::new();
+    for row in rows {
+        let (x, y) = (x_of(row), row.errors.all.rmse);
+        if x <= 0.0 || y <= 0.0 {
+            continue;
+        }
+        let (label, point) = (row.method.label(), (x.log10(), y.log10()));
+        match lines.iter_mut().find(|(known, _)| *known == label) {
+            Some((_, points)) => points.push(point),
+            None => lines.push((label, vec![point])),
         }
     }
-    out
+    let points = || lines.iter().flat_map(|(_, points)| points);
+    let x_range = padded(points().map(|p| p.0))?;
+    let y_range = padded(points().map(|p| p.1))?;
+    let x_ticks = match axis {
+        Axis::RaysPerPixel => ticks_at(points().map(|p| p.0)),
+        Axis::Secs => ticks(x_range),
+    };
+    let guide = (axis == Axis::RaysPerPixel).then(|| {
+        let top = points().map(|p| p.1 + 0.5 * p.0).fold(f64::MIN, f64::max);
+        Guide {
+            label: "slope -1/2: independent samples".to_owned(),
+            ends: [x_range.0, x_range.1].map(|x| (x, top - 0.5 * x)),
+        }
+    });
+    Some(Chart {
+        title: format!("{}, {} x {}", first.scene, first.width, first.height),
+        x_label: match axis {
+            Axis::RaysPerPixel => "rays per pixel".to_owned(),
+            Axis::Secs if by_wall => format!("seconds on the clock, {}", first.device),
+            Axis::Secs => "processor seconds, all threads".to_owned(),
+        },
+        x_ticks,
+        y_label: "RMSE, linear".to_owned(),
+        x_range,
+        y_range,
+        lines,
+        guide,
+        legend: Legend::UpperRight,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::chart::COLOURS;
     use crate::report::record::test_support::report;
-
-    #[test]
-    fn ticks_are_round_numbers_inside_the_range() {
-        let values = |range: (f64, f64)| -> Vec<String> {
-            ticks((range.0.log10(), range.1.log10()))
-                .into_iter()
-                .map(tick_label)
-                .collect()
-        };
-        assert_eq!(values((0.004, 0.06)), ["0.005", "0.01", "0.02", "0.05"]);
-        assert_eq!(values((0.9, 260.0)).join(" "), "1 2 5 10 20 50 100 200");
-        assert_eq!(values((1e-6, 0.2)).last().unwrap(), "0.1");
-        assert_eq!(values((1.1e-4, 2.4e-4)), ["1.5e-4", "2e-4"]);
-        assert_eq!(values((1.1, 1.9)), ["1.5"]);
-        assert_eq!(tick_label(49f64.log10()), "49");
-    }
 
     #[test]
     fn every_method_has_its_line() {

@@ -12,7 +12,7 @@ pub(crate) mod meshes;
 mod oracle;
 mod pictures;
 mod report;
-mod scenes;
+pub(crate) mod scenes;
 mod traversal;
 
 use std::time::Instant;

@@ -13,7 +13,7 @@ use crate::scene::{
 };
 
 /// A scene of these objects, seen by a pinhole, one interaction before the light.
-pub(super) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -> Scene {
+pub(crate) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -> Scene {
     Scene {
         name: "stress".to_owned(),
         path: PathBuf::new(),
@@ -48,7 +48,7 @@ pub(super) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -
 }
 
 /// `focal_px`: focal length in pixels.
-pub(super) fn camera(
+pub(crate) fn camera(
     [width, height]: [u32; 2],
     focal_px: f64,
     position: DVec3,
@@ -75,7 +75,7 @@ pub(super) fn camera(
     }
 }
 
-pub(super) fn object(
+pub(crate) fn object(
     side: Side,
     name: &str,
     primitive: Primitive,
@@ -105,7 +105,7 @@ fn colored([r, g, b]: [f32; 3]) -> Material {
     }
 }
 
-pub(super) fn matt(color: [f32; 3]) -> Material {
+pub(crate) fn matt(color: [f32; 3]) -> Material {
     Material {
         specular: 0.0,
         ..colored(color)
@@ -159,7 +159,7 @@ pub(super) fn square(half: f64) -> Primitive {
 }
 
 /// Turned by this angle about Y, then moved.
-pub(super) fn place(translation: DVec3, turn_deg: f64) -> DMat4 {
+pub(crate) fn place(translation: DVec3, turn_deg: f64) -> DMat4 {
     DMat4::from_translation(translation) * DMat4::from_rotation_y(turn_deg.to_radians())
 }
 

@@ -16,9 +16,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::render::{above_zero, camera_noise, choice};
-use super::{Failure, Outcome, print, say, stress};
+use super::{Failure, Outcome, growth, print, say, stress};
 use crate::renderer::{CameraNoise, SCRAMBLES, Skip};
-use crate::report::{FORMAT, Machine, Method, Plan, Report, markdown, shrink, text};
+use crate::report::{FORMAT, Law, Machine, Method, Plan, Report, markdown, shrink, text};
 use crate::scene::{self, BackendChoice, Composite, Estimator, SamplerKind, Scene, Settings};
 
 use benchmark::benchmark;
@@ -37,7 +37,7 @@ use regression::compare;
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Scene files
-    #[arg(required_unless_present_any = ["paper_table", "report", "stress"])]
+    #[arg(required_unless_present_any = ["paper_table", "report", "stress", "growth"])]
     scenes: Vec<PathBuf>,
     /// Folder to write
     #[arg(short, long, value_name = "DIR", default_value = "bench")]
@@ -119,7 +119,12 @@ pub(super) struct Arguments {
     /// Where the time of a GPU render goes, kernel by kernel, at each number of rays per pixel. Writes gpu-time.json
     #[arg(long, conflicts_with_all = ["reference", "target_rmse", "against", "ablate", "no_skip", "target_error", "camera_noise", "report", "paper_table", "stress"])]
     gpu_time: bool,
-    /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->, <!-- stress -->, <!-- gpu-time -->) and
+    /// How the cost grows with triangles, pixels, rays, objects and lights: the exponent of each, beside what is expected; minutes.
+    /// Writes growth.json, .csv and plots
+    #[arg(long, value_name = "WHAT,WHAT", num_args = 0.., require_equals = true, value_delimiter = ',', value_parser = choice::<Law>(),
+        conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate", "no_skip", "target_error", "camera_noise", "filter", "report", "paper_table", "stress", "gpu_time"])]
+    growth: Option<Vec<Law>>,
+    /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->, <!-- stress -->, <!-- gpu-time -->, <!-- growth -->) and
     /// <!-- end -->
     #[arg(long, value_name = "FILE")]
     write_docs: Option<PathBuf>,
@@ -148,6 +153,8 @@ impl Arguments {
         }
         let section = if self.stress {
             "stress"
+        } else if self.growth.is_some() {
+            "growth"
         } else if self.paper_table {
             "paper-table"
         } else if self.gpu_time {
@@ -189,9 +196,22 @@ impl Arguments {
 }
 
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
-    if job.arguments.stress {
+    if job.arguments.stress || job.arguments.growth.is_some() {
         job.make_folder()?;
-        let (outcome, table) = stress::run(&job.arguments.output, &job.machine, &command_line())?;
+        let (folder, command) = (&job.arguments.output, command_line());
+        let (outcome, table) = match &job.arguments.growth {
+            Some(laws) => {
+                let about = (&job.empty_report().machine, command.as_str());
+                growth::run(
+                    laws,
+                    &job.plan(Vec::new(), job.methods.clone()),
+                    job.arguments.shrink,
+                    folder,
+                    about,
+                )?
+            }
+            None => stress::run(folder, &job.machine, &command)?,
+        };
         if let Some(docs) = &job.docs
             && outcome != Outcome::Interrupted
         {
