@@ -8,8 +8,8 @@
 
 Every contender renders each scene `--runs` times, with another seed each, one after the other. The squared error is the variance between its own
 runs, so that no contender is judged by another's converged picture; *mean error* is the difference of the mean pictures from the reference of
-tests/references/. CPU seconds count all threads and are the median of the runs: mixray's with loading and building, Mitsuba's and Cycles' of
-rendering alone, without compilation and without the mask, which is taken from the reference for Cycles. `--write` replaces the scenes' rows in
+tests/references/. CPU seconds count all threads and are the median of the runs, of rendering alone: without loading, compilation and the
+trees, with mixray's pilot, with what Cycles does anew for each picture; without the mask, which is taken from the reference for Cycles. `--write` replaces the scenes' rows in
 docs/benchmarks.md.
 """
 
@@ -33,11 +33,9 @@ def mixray(reference, folder, rays_per_pixel, estimator, sampler):
 
     def render(seed):
         options = {"rays_per_pixel": rays_per_pixel, "seed": seed, "estimator": estimator, "sampler": sampler}
-        start = cpu_secs()
-        mixray_run.render(path, picture="out.png", **options)
-        secs = cpu_secs() - start
         # A PNG spares the real radiance that an EXR's planes need; the composite is read from an EXR of the same seed.
-        return mixray_run.rgb(mixray_run.render(path, **options)[0]), secs
+        _, stats = mixray_run.render(path, picture="out.png", **options)
+        return mixray_run.rgb(mixray_run.render(path, **options)[0]), stats["seconds"]["cpu"]
 
     return render
 

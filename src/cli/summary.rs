@@ -63,14 +63,15 @@ fn lines(stats: &Stats, error: &str) -> String {
         0.0
     };
     format!(
-        "time    {:.2} s: load {:.2}, build {:.2}, compile {:.2}, render {:.2}, write {:.2}\n\
+        "time    {:.2} s: load {:.2}, build {:.2}, compile {:.2}, look ahead {:.2}, render {:.2}, write {:.2}\n\
          rays    {} primary, {} in all: mixed {}, real {}, mixed shadow {}, real shadow {}; {rate:.2} Mrays/s on {} ({})\n\
          pixels  {} skipped, {} background, {} edge, {} virtual\n\
          error   {error}\n",
-        s.load + s.build + s.compile + s.render + s.write,
+        s.load + s.build + s.compile + s.look_ahead + s.render + s.write,
         s.load,
         s.build,
         s.compile,
+        s.look_ahead,
         s.render,
         s.write,
         short(r.primary),

@@ -5,13 +5,13 @@
 //! underrated takes further scrambles of the same kind. Every sample that is taken counts, whatever it brings.
 
 use std::rc::Rc;
-use std::time::Instant;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::series::{Run, Series};
 use super::tiles::{MARGIN, Tiles, Trial, gain_for};
+use super::watch::Watch;
 use super::{ErrorGoal, Progress, RenderError, Renderer, Skip};
 use crate::film::{Film, Scrambles, composite, pooled};
 use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PixelInfo};
@@ -73,7 +73,6 @@ impl Renderer {
         if !self.instants.is_empty() {
             return Err(RenderError::MovingGoal);
         }
-        let start = Instant::now();
         let stops_at_noise = !self.options.without.contains(Skip::CameraNoise);
         let goal = &ErrorGoal {
             noise: goal.noise.filter(|_| stops_at_noise),
@@ -82,6 +81,7 @@ impl Renderer {
         if self.stated.is_some() {
             self.look_ahead();
         }
+        let watch = Watch::start();
         let frame = self.packed.frame;
         self.packed.frame.rays_total = 1;
         self.film.first_sample = 0;
@@ -89,7 +89,7 @@ impl Renderer {
             goal,
             cancelled,
             progress,
-            start,
+            start: watch.begin,
             done: 0,
             expected: 2 * TRIAL_SCRAMBLES + SCRAMBLES,
         };
@@ -98,7 +98,7 @@ impl Renderer {
         self.packed.frame = frame;
         self.send_frame();
         self.state(goal, &tiles, outcome?);
-        self.seconds.render += start.elapsed().as_secs_f64();
+        self.count_render(&watch);
         Ok(())
     }
 

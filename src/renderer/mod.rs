@@ -27,6 +27,7 @@ mod series;
 mod skips;
 mod stats;
 mod tiles;
+mod watch;
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -40,6 +41,8 @@ pub use motion::FrameEdit;
 pub use picture_motion::PreviousView;
 pub use skips::{Skip, Without};
 pub use stats::{Stats, StatsRays};
+
+use watch::Watch;
 
 use crate::cpu;
 use crate::film::{
@@ -97,11 +100,15 @@ pub enum RenderError {
 /// Seconds spent before and in rendering.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Seconds {
-    /// Acceleration structures, packing, the pilot and the albedo estimate.
+    /// Acceleration structures, packing and the albedo estimate.
     pub build: f64,
     /// Shader compilation.
     pub compile: f64,
+    /// The pilot.
+    pub look_ahead: f64,
     pub render: f64,
+    /// Of the processors, in all threads of the process, for `look_ahead` and `render`.
+    pub cpu: f64,
 }
 
 /// A scene being rendered.
@@ -141,7 +148,7 @@ impl Renderer {
     /// # Errors
     /// The scene does not fit the packed form or the adapter, or `gpu` was asked for where there is none.
     pub fn new(scene: Scene, options: RendererOptions) -> Result<Self, RenderError> {
-        let start = std::time::Instant::now();
+        let watch = Watch::start();
         let total = scene.settings.rays_per_pixel;
         let (first_sample, end_sample) = options.sample_range.unwrap_or((0, total));
         if first_sample >= end_sample || end_sample > total {
@@ -174,15 +181,16 @@ impl Renderer {
         renderer.prepare_photo();
         renderer.prepare_shutter()?;
         renderer.look_ahead();
-        renderer.seconds.build = start.elapsed().as_secs_f64();
-        let start = std::time::Instant::now();
+        renderer.seconds.build = watch.secs() - renderer.seconds.look_ahead;
+        let watch = Watch::start();
         renderer.backend = renderer.open_backend()?;
-        renderer.seconds.compile = start.elapsed().as_secs_f64();
+        renderer.seconds.compile = watch.secs();
         Ok(renderer)
     }
 
     /// Runs the pilot and begins the film that follows its plan.
     fn look_ahead(&mut self) {
+        let watch = Watch::start();
         self.stated = None;
         let without = self.options.without;
         without.apply_to_frame(&mut self.packed.frame);
@@ -199,6 +207,8 @@ impl Renderer {
         if self.options.filter {
             self.surfaces = cpu::diffuse_surfaces(&self.packed);
         }
+        self.seconds.look_ahead += watch.secs();
+        self.seconds.cpu += watch.cpu_secs();
     }
 
     /// The film as pictures show it.
@@ -296,9 +306,9 @@ impl Renderer {
         if self.stated.is_some() {
             return Ok(());
         }
-        let start = std::time::Instant::now();
+        let watch = Watch::start();
         let deadline = match budget {
-            Budget::Time(time) => Some(start + time),
+            Budget::Time(time) => Some(watch.begin + time),
             Budget::Complete | Budget::Rays(_) => None,
         };
         let first = self.film.first_sample;
@@ -314,7 +324,7 @@ impl Renderer {
             };
         if !self.instants.is_empty() && !self.nothing_to_trace() {
             self.advance_in_time(first + end, cancelled, deadline, progress)?;
-            self.seconds.render += start.elapsed().as_secs_f64();
+            self.count_render(&watch);
             return Ok(());
         }
         let mut done = before;
@@ -335,11 +345,11 @@ impl Renderer {
                 samples: done,
                 samples_total: total,
                 rays: self.rays,
-                elapsed: start.elapsed(),
+                elapsed: watch.begin.elapsed(),
             });
         }
         self.replay_real()?;
-        self.seconds.render += start.elapsed().as_secs_f64();
+        self.count_render(&watch);
         Ok(())
     }
 
@@ -492,9 +502,15 @@ impl Renderer {
         self.restart(true, Changed::All)
     }
 
+    fn count_render(&mut self, watch: &Watch) {
+        self.seconds.render += watch.secs();
+        self.seconds.cpu += watch.cpu_secs();
+    }
+
     /// Takes up the packed scene after an edit.
     fn restart(&mut self, real_light_changed: bool, changed: Changed) -> Result<(), RenderError> {
-        let start = std::time::Instant::now();
+        let watch = Watch::start();
+        let look_ahead = self.seconds.look_ahead;
         if real_light_changed {
             self.prepare_photo();
         }
@@ -507,11 +523,11 @@ impl Renderer {
             };
             gpu.update_scene(&self.packed, changed)?;
         }
-        self.seconds.build += start.elapsed().as_secs_f64();
+        self.seconds.build += watch.secs() - (self.seconds.look_ahead - look_ahead);
         if matches!(self.backend, Backend::Undecided) {
-            let start = std::time::Instant::now();
+            let watch = Watch::start();
             self.backend = self.open_backend()?;
-            self.seconds.compile += start.elapsed().as_secs_f64();
+            self.seconds.compile += watch.secs();
         }
         Ok(())
     }

@@ -19,7 +19,7 @@ pub struct Stats {
     pub device: String,
 }
 
-/// Wall-clock seconds.
+/// Seconds on the clock, but for `cpu`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StatsSeconds {
     /// Scene file and everything it names.
@@ -28,9 +28,13 @@ pub struct StatsSeconds {
     pub build: f64,
     /// Shaders.
     pub compile: f64,
+    /// The pilot, which plans the samples.
+    pub look_ahead: f64,
     pub render: f64,
     /// Composite and files.
     pub write: f64,
+    /// Of the processors, in all threads, for `look_ahead` and `render`.
+    pub cpu: f64,
 }
 
 /// How good the picture is.
@@ -76,8 +80,10 @@ impl Stats {
                 load: load_secs,
                 build: seconds.build,
                 compile: seconds.compile,
+                look_ahead: seconds.look_ahead,
                 render: seconds.render,
                 write: write_secs,
+                cpu: seconds.cpu,
             },
             rays: rays.into(),
             error: StatsError {
@@ -129,7 +135,7 @@ mod tests {
         }
         keys.sort();
         let mut documented: Vec<&str> = "backend device non_finite_samples \
-            seconds.load seconds.build seconds.compile seconds.render seconds.write \
+            seconds.load seconds.build seconds.compile seconds.look_ahead seconds.render seconds.write seconds.cpu \
             rays.primary rays.mixed rays.real rays.mixed_shadow rays.real_shadow \
             error.rms error.from error.scrambles pixels.background pixels.edge pixels.virtual pixels.skipped"
             .split_whitespace()
