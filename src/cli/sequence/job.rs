@@ -34,7 +34,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         )
     })?;
     refuse_same_place(frames, output)?;
-    if let Some(path) = &arguments.stats {
+    if let Some(path) = &arguments.flags.stats {
         check_writable(path)?;
     }
     let mut source = FrameSource::open(frames)?;
@@ -318,7 +318,7 @@ impl Sequence<'_> {
             &scene.fingerprint(),
             &format!(
                 "{:?} {:?} {:?}",
-                scene.settings, scene.stages, arguments.png_bits
+                scene.settings, scene.stages, arguments.flags.png_bits
             ),
             &trajectory,
             &format!("{:?} {scope}", arguments.focus_pull),
@@ -327,7 +327,7 @@ impl Sequence<'_> {
             path: self.output,
             fingerprint,
             header: header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate)),
-            png_bits: arguments.png_bits,
+            png_bits: arguments.flags.png_bits,
             overwrite: arguments.overwrite,
         })?;
         Ok(Started {
@@ -365,7 +365,7 @@ impl Sequence<'_> {
             self.non_finite_samples,
             started.renderer.as_ref(),
         );
-        if let Some(path) = &self.arguments.stats {
+        if let Some(path) = &self.arguments.flags.stats {
             write_text(path, &serde_json::to_string_pretty(&stats)?)?;
         }
         let text = stats.text(&self.output.display().to_string());
