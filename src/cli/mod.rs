@@ -14,6 +14,7 @@ mod layers;
 mod merge;
 mod motion_blur;
 mod noise;
+mod picture_flags;
 mod progress;
 mod render;
 mod sequence;

@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
+use super::picture_flags::PictureFlags;
 use super::{Failure, Outcome, interrupt, print, progress, say, summary};
 use crate::gpu::GpuStages;
 use crate::output::{
@@ -13,12 +14,9 @@ use crate::output::{
     write_film, write_png, write_text,
 };
 use crate::renderer::{
-    Budget, CameraNoise, ErrorGoal, Renderer, RendererOptions, SCRAMBLES, Skip, Stats, Without,
+    Budget, CameraNoise, ErrorGoal, Renderer, RendererOptions, SCRAMBLES, Stats,
 };
-use crate::scene::{
-    self, BackendChoice, Choice, Composite, Estimator, MotionBlurMethod, NoiseFit, NoiseProfile,
-    Overrides, SamplerKind, Settings,
-};
+use crate::scene::{self, Choice, MotionBlurMethod, NoiseFit, NoiseProfile, Overrides};
 use crate::stages::finish;
 
 /// Renders a scene's virtual objects into its photograph
@@ -31,32 +29,8 @@ pub(super) struct Arguments {
     /// Picture to write, .png or .exr with all planes; may be given several times [default: the scene's folder name + .png]
     #[arg(short, long, value_name = "OUT")]
     output: Vec<PathBuf>,
-    /// Primary rays for each pixel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_RAYS_PER_PIXEL)))]
-    rpp: Option<u32>,
-    /// Seed of all random numbers: the same seed gives the same picture
-    #[arg(long, value_name = "N")]
-    seed: Option<u32>,
-    /// Where to render; auto: on a hardware GPU if there is one
-    #[arg(long, value_parser = choice::<BackendChoice>())]
-    backend: Option<BackendChoice>,
-    /// paper is the baseline of Kan and Kaufmann 2012
-    #[arg(long, value_parser = choice::<Estimator>())]
-    estimator: Option<Estimator>,
-    #[arg(long, value_parser = choice::<SamplerKind>())]
-    sampler: Option<SamplerKind>,
-    /// quotient cancels an error in the proxy's albedo or the overall light
-    #[arg(long, value_parser = choice::<Composite>())]
-    composite: Option<Composite>,
-    /// Surface interactions before the light; 1 is direct light only
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_BOUNCES)))]
-    max_bounces: Option<u32>,
-    /// Bits a channel of PNG pictures [default: 16 for a 16-bit photograph, else 8]
-    #[arg(long, value_parser = PossibleValuesParser::new(["8", "16"]).map(png_bits))]
-    png_bits: Option<PngBits>,
-    /// Write times and counts as JSON
-    #[arg(long, value_name = "FILE")]
-    stats: Option<PathBuf>,
+    #[command(flatten)]
+    flags: PictureFlags,
     /// Render only these of each pixel's rays, FROM to TO - 1, into an .exr that `mixray merge` puts together with the others
     #[arg(long, value_name = "FROM..TO", value_parser = sample_range)]
     range: Option<(u32, u32)>,
@@ -74,27 +48,14 @@ pub(super) struct Arguments {
     /// Smooth what virtual objects change on diffuse real surfaces, for previews of a few rays per pixel: biased
     #[arg(long, conflicts_with = "range")]
     filter: bool,
-    /// Do without a saving, to see what it is worth; may be given several times
-    #[arg(long, value_name = "NAME", value_parser = choice::<Skip>())]
-    no_skip: Vec<Skip>,
     /// Frame number of a video: with [noise], every frame has its own
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
-    /// CPU threads [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
 }
 
 pub(super) fn choice<T: Choice + Send + Sync>() -> impl TypedValueParser<Value = T> {
     let names = T::CHOICES.iter().map(|&(name, _)| name);
     PossibleValuesParser::new(names).try_map(|name| T::from_name(&name).ok_or("is not a choice"))
-}
-
-pub(super) fn png_bits(name: String) -> PngBits {
-    match name.as_str() {
-        "16" => PngBits::Sixteen,
-        _ => PngBits::Eight,
-    }
 }
 
 /// What was asked for, with outputs that can be written.
@@ -103,13 +64,10 @@ pub(super) struct Job {
     scene: PathBuf,
     /// Empty: the default, which the scene's name decides.
     targets: Vec<Target>,
+    flags: PictureFlags,
     overrides: Overrides,
-    png_bits: Option<PngBits>,
-    stats: Option<PathBuf>,
     frame: u32,
-    threads: Option<u16>,
     range: Option<(u32, u32)>,
-    without: Without,
     goal: Option<ErrorGoal>,
     /// The goal is the camera's noise, which the scene tells.
     noise_of_scene: bool,
@@ -123,7 +81,7 @@ impl Arguments {
             .iter()
             .map(|path| Target::picture(path))
             .collect::<Result<_, _>>()?;
-        if let Some(path) = &self.stats {
+        if let Some(path) = &self.flags.stats {
             check_writable(path)?;
         }
         if self.range.is_some() && !targets.iter().any(|t| t.format() == Format::Exr) {
@@ -140,20 +98,12 @@ impl Arguments {
             targets,
             overrides: Overrides {
                 // With a goal it is a limit, and not what the pilot plans for.
-                rays_per_pixel: self.rpp.filter(|_| goal.is_none()),
-                max_bounces: self.max_bounces,
-                seed: self.seed,
-                estimator: self.estimator,
-                sampler: self.sampler,
-                composite: self.composite,
-                backend: self.backend,
+                rays_per_pixel: self.flags.rpp.filter(|_| goal.is_none()),
+                ..self.flags.overrides()
             },
-            png_bits: self.png_bits,
-            stats: self.stats,
+            flags: self.flags,
             frame: self.frame,
-            threads: self.threads,
             range: self.range,
-            without: self.no_skip.into_iter().collect(),
         })
     }
 }
@@ -163,7 +113,7 @@ impl Arguments {
         if self.target_error.is_none() && self.stop_at.is_none() {
             return Ok(None);
         }
-        if self.rpp.is_some_and(|rpp| rpp < SCRAMBLES) {
+        if self.flags.rpp.is_some_and(|rpp| rpp < SCRAMBLES) {
             return Err(Failure(format!(
                 "--rpp limits the rays of a pixel here: the error is taken from {SCRAMBLES} renders, each of one ray or more"
             )));
@@ -171,17 +121,16 @@ impl Arguments {
         Ok(Some(ErrorGoal {
             standard_error: self.target_error,
             noise: self.camera_noise.as_deref().map(camera_noise).transpose()?,
-            max_rays_per_pixel: self.rpp.unwrap_or(ErrorGoal::DEFAULT_MAX_RAYS_PER_PIXEL),
+            max_rays_per_pixel: self
+                .flags
+                .rpp
+                .unwrap_or(ErrorGoal::DEFAULT_MAX_RAYS_PER_PIXEL),
         }))
     }
 }
 
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
-    if let Some(threads) = job.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(threads))
-            .build_global()?;
-    }
+    job.flags.start_threads()?;
     let start = Instant::now();
     let mut scene = scene::load(&job.scene)?;
     scene.settings.apply(&job.overrides);
@@ -208,7 +157,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         given => given.to_vec(),
     };
     let outputs: Vec<&Path> = (targets.iter().map(Target::path))
-        .chain(job.stats.as_deref())
+        .chain(job.flags.stats.as_deref())
         .collect();
     check_distinct(&outputs, &scene.inputs)?;
     let load_secs = start.elapsed().as_secs_f64();
@@ -216,7 +165,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let options = RendererOptions {
         all_planes: targets.iter().any(|t| t.format() == Format::Exr),
         sample_range: job.range,
-        without: job.without,
+        without: job.flags.without(),
         filter: job.filter,
     };
     let mut renderer = Renderer::new(scene, options)?;
@@ -244,7 +193,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     write(
         &renderer,
         &targets,
-        job.png_bits,
+        job.flags.png_bits,
         job.frame,
         job.range.map(|_| {
             let first = renderer.film().first_sample;
@@ -253,7 +202,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     )?;
     let write_secs = start.elapsed().as_secs_f64();
     let stats = Stats::new(&renderer, load_secs, write_secs);
-    if let Some(path) = &job.stats {
+    if let Some(path) = &job.flags.stats {
         write_text(path, &stats.to_json())?;
     }
     print(&summary::text(&renderer, &stats, &targets))?;

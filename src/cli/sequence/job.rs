@@ -36,7 +36,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         )
     })?;
     refuse_same_place(frames, output)?;
-    if let Some(path) = &arguments.stats {
+    if let Some(path) = &arguments.flags.stats {
         check_writable(path)?;
     }
     let mut source = FrameSource::open(frames)?;
@@ -221,7 +221,7 @@ impl Sequence<'_> {
             scene.photo = Some(frame.photo.clone());
             scene.camera = camera.clone();
             let options = RendererOptions {
-                without: self.arguments.no_skip.iter().copied().collect(),
+                without: self.arguments.flags.without(),
                 ..RendererOptions::default()
             };
             let renderer = Renderer::new(scene, options)?;
@@ -319,13 +319,13 @@ impl Sequence<'_> {
             "{:?} {:?} {:?} {:?}",
             poses.entries, poses.intrinsics, self.files.intrinsics, self.rate
         );
-        let without: Without = arguments.no_skip.iter().copied().collect();
+        let without: Without = arguments.flags.without();
         let fingerprint = fingerprint_of([
             env!("CARGO_PKG_VERSION"),
             &scene.fingerprint(),
             &format!(
                 "{:?} {:?} {:?} {without:?}",
-                scene.settings, scene.stages, arguments.png_bits
+                scene.settings, scene.stages, arguments.flags.png_bits
             ),
             &trajectory,
             &format!("{:?} {scope}", arguments.focus_pull),
@@ -334,7 +334,7 @@ impl Sequence<'_> {
             path: self.output,
             fingerprint,
             header: header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate)),
-            png_bits: arguments.png_bits,
+            png_bits: arguments.flags.png_bits,
             overwrite: arguments.overwrite,
         })?;
         Ok(Started {
@@ -372,7 +372,7 @@ impl Sequence<'_> {
             self.non_finite_samples,
             started.renderer.as_ref(),
         );
-        if let Some(path) = &self.arguments.stats {
+        if let Some(path) = &self.arguments.flags.stats {
             write_text(path, &serde_json::to_string_pretty(&stats)?)?;
         }
         let text = stats.text(&self.output.display().to_string());

@@ -8,13 +8,9 @@ mod report;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use super::render::{choice, png_bits};
+use super::picture_flags::PictureFlags;
 use super::{Failure, Outcome};
-use crate::output::PngBits;
-use crate::renderer::Skip;
-use crate::scene::{BackendChoice, Composite, Estimator, Overrides, SamplerKind, Settings};
 
 /// Renders a scene's virtual objects into the frames of a video
 ///
@@ -56,58 +52,12 @@ pub(super) struct Arguments {
     /// Largest reprojection error that passes, pixels
     #[arg(long, value_name = "PX", default_value_t = 2.0, value_parser = positive)]
     max_error: f64,
-    /// Primary rays for each pixel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_RAYS_PER_PIXEL)))]
-    rpp: Option<u32>,
-    /// Seed of the random numbers; frame n has the seed plus n
-    #[arg(long, value_name = "N")]
-    seed: Option<u32>,
-    /// Where to render; auto: on a hardware GPU if there is one
-    #[arg(long, value_parser = choice::<BackendChoice>())]
-    backend: Option<BackendChoice>,
-    #[arg(long, value_parser = choice::<Estimator>())]
-    estimator: Option<Estimator>,
-    #[arg(long, value_parser = choice::<SamplerKind>())]
-    sampler: Option<SamplerKind>,
-    #[arg(long, value_parser = choice::<Composite>())]
-    composite: Option<Composite>,
-    /// Surface interactions before the light; 1 is direct light only
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_BOUNCES)))]
-    max_bounces: Option<u32>,
-    /// Do without a saving, to see what it is worth; may be given several times
-    #[arg(long, value_name = "NAME", value_parser = choice::<Skip>())]
-    no_skip: Vec<Skip>,
-    /// Bits a channel of PNG frames [default: 16 for 16-bit frames, else 8]
-    #[arg(long, value_parser = PossibleValuesParser::new(["8", "16"]).map(png_bits))]
-    png_bits: Option<PngBits>,
-    /// Write times and counts as JSON
-    #[arg(long, value_name = "FILE")]
-    stats: Option<PathBuf>,
-    /// CPU threads [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
-}
-
-impl Arguments {
-    fn overrides(&self) -> Overrides {
-        Overrides {
-            rays_per_pixel: self.rpp,
-            max_bounces: self.max_bounces,
-            seed: self.seed,
-            estimator: self.estimator,
-            sampler: self.sampler,
-            composite: self.composite,
-            backend: self.backend,
-        }
-    }
+    #[command(flatten)]
+    flags: PictureFlags,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    if let Some(threads) = arguments.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(threads))
-            .build_global()?;
-    }
+    arguments.flags.start_threads()?;
     match &arguments.check {
         Some(points) => check::run(arguments, points.as_deref()),
         None => job::run(arguments),

@@ -44,7 +44,7 @@ impl Files {
             intrinsics: self.intrinsics_of(view),
         };
         let mut scene = scene::load_with(&arguments.scene, given)?;
-        scene.settings.apply(&arguments.overrides());
+        scene.settings.apply(&arguments.flags.overrides());
         for warning in &scene.warnings {
             say("warning", warning);
         }
