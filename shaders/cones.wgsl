@@ -44,13 +44,13 @@ struct ConeSample {
     pdf: f32,
 }
 
-fn cone_sample(position: vec3<f32>, ns: vec3<f32>, u: vec3<f32>) -> ConeSample {
+fn cone_sample(position: vec3<f32>, ns: vec3<f32>, choice: f32, u: vec2<f32>) -> ConeSample {
     var total = 0.0;
     for (var i = 0u; i < frame.sphere_count; i++) {
         total += cone_of(i, position, ns).weight;
     }
     if total <= 0.0 { return ConeSample(ns, 0.0); }
-    var left = u.x * total;
+    var left = choice * total;
     var chosen = cone_of(0u, position, ns);
     for (var i = 0u; i < frame.sphere_count; i++) {
         let cone = cone_of(i, position, ns);
@@ -59,14 +59,14 @@ fn cone_sample(position: vec3<f32>, ns: vec3<f32>, u: vec3<f32>) -> ConeSample {
         chosen = cone;
         if left < 0.0 { break; }
     }
-    var cos = safe_sqrt(1.0 - u.y);
-    var sin = safe_sqrt(u.y);
+    var cos = safe_sqrt(1.0 - u.x);
+    var sin = safe_sqrt(u.x);
     if !chosen.wide {
-        let drop = u.y * chosen.one_minus_cos;
+        let drop = u.x * chosen.one_minus_cos;
         cos = 1.0 - drop;
         sin = safe_sqrt(drop * (2.0 - drop));
     }
-    let phi = sincos_2pi(u.z);
+    let phi = sincos_2pi(u.y);
     let basis = orthonormal_basis(chosen.axis);
     let direction = basis.t * (sin * phi.cos) + basis.b * (sin * phi.sin) + chosen.axis * cos;
     return ConeSample(direction, cone_pdf(position, ns, direction));

@@ -188,7 +188,7 @@ fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample) {
 fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
     let u = draw(st, SET_DIFFERENCE_CONE);
     if frame.sphere_count == 0u || u.w >= roulette.cone { return; }
-    let c = cone_sample(s.position, s.ns, u.xyz);
+    let c = cone_sample(s.position, s.ns, u.x, u.yz);
     if c.pdf <= 0.0 { return; }
     let f = bsdf_eval(s, wo, c.direction);
     if max_element(f.f_cos) <= 0.0 { return; }

@@ -48,7 +48,8 @@ def mitsuba(reference, rays_per_pixel):
         mask = passes.mask(1_000_000 + seed)
         start = cpu_secs()
         mixed, real = passes.mixed(1_000_000 + seed), passes.real(1_000_000 + seed)
-        return reference.scene.composite(mask, mixed, real), cpu_secs() - start
+        secs = cpu_secs() - start
+        return reference.scene.composite(mask, mixed, real), secs
 
     return render
 

@@ -28,7 +28,7 @@ mod gpu_tests;
 #[cfg(test)]
 mod tests;
 
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
 
 use glam::Vec3;
 use obvhs::bvh2::Bvh2;
@@ -100,8 +100,8 @@ pub enum AccelError {
 /// The triangles of one world, ready for rays on the CPU and, once a GPU asks, for upload.
 pub struct WorldBvh {
     wide: WideBvh,
-    /// What the GPU's tree is made from.
-    tree: Option<Bvh2>,
+    /// What the GPU's tree is made from, until it is.
+    tree: Mutex<Option<Bvh2>>,
     triangles: Vec<[Vec3; 3]>,
     first_id: u32,
     compressed: OnceLock<CompressedBvh>,
@@ -143,7 +143,7 @@ impl WorldBvh {
         }
         Ok(WorldBvh {
             wide,
-            tree,
+            tree: Mutex::new(tree),
             triangles: triangles.to_vec(),
             first_id,
             compressed: OnceLock::new(),
@@ -164,8 +164,8 @@ impl WorldBvh {
         self.compressed.get_or_init(|| {
             let convert =
                 |tree: &Bvh2| CompressedBvh::convert(tree, &self.triangles, self.first_id);
-            match &self.tree {
-                Some(tree) => convert(tree).unwrap_or_else(|| {
+            match self.tree.lock().unwrap_or_else(|e| e.into_inner()).take() {
+                Some(tree) => convert(&tree).unwrap_or_else(|| {
                     convert(&binary::build_balanced(&self.triangles))
                         .expect("a balanced tree fits the stack")
                 }),

@@ -78,6 +78,17 @@ impl SampleSet {
         bits.map(uniform_from_bits)
     }
 
+    /// The last two.
+    #[inline]
+    pub fn second_pair(&self) -> [f32; 2] {
+        let bits = if self.is_grid() {
+            self.grid_pair(1)
+        } else {
+            [self.sobol(2), self.sobol(3)]
+        };
+        bits.map(uniform_from_bits)
+    }
+
     /// The third.
     #[inline]
     pub fn third(&self) -> f32 {
@@ -131,8 +142,8 @@ impl SampleSet {
 /// All four numbers of a set.
 pub fn sample_4d(key: SampleKey, set_id: u32) -> [f32; 4] {
     let set = SampleSet::new(key, set_id);
-    let [x, y] = set.pair();
-    [x, y, set.third(), set.fourth()]
+    let ([x, y], [z, w]) = (set.pair(), set.second_pair());
+    [x, y, z, w]
 }
 
 /// Columns of a grid of at least `total` cells, as square as possible: the smallest n with n * n >= total.

@@ -29,12 +29,19 @@ pub(super) fn run(
     let steps = progress::Steps::new(count);
     let mut curves = Vec::new();
     for &law in &laws {
+        if cancelled() {
+            break;
+        }
         curves.extend(grow(law, plan, shrink, &cancelled, &mut |what| {
             steps.say(what);
             steps.step();
         })?);
     }
     steps.clear();
+    if curves.is_empty() {
+        // An earlier run's figures stay.
+        return Ok((Outcome::Interrupted, String::new()));
+    }
     let mut json = serde_json::to_string_pretty(&serde_json::json!({
         "format": FORMAT,
         "mixray": env!("CARGO_PKG_VERSION"),

@@ -19,7 +19,7 @@ pub const ESTIMATOR_DIRECT: u32 = 0;
 pub const ESTIMATOR_PAPER: u32 = 1;
 
 /// Random numbers of one decision at the present vertex, computed when asked for. The samplers spread the first pair of a set best: it is what
-/// directions and points on lights are found by.
+/// directions and points on lights are found by. (The shader computes all four at once, as a vector.)
 #[inline]
 pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> SampleSet {
     let set = FIRST_DEPTH_SET + st.depth * SETS_PER_DEPTH + purpose;

@@ -182,7 +182,8 @@ fn next_event(
     let u = draw(scene, st, set);
     let mut index = 0;
     if scene.frame.light_count > 1 {
-        index = light_select(scene, u.third(), u.fourth());
+        let [choice, coin] = u.second_pair();
+        index = light_select(scene, choice, coin);
     }
     if difference
         && scene.frame.flags & FRAME_BOTH_SHADOWS == 0

@@ -24,7 +24,7 @@ const EMISSION_POINTS: [[f32; 2]; 7] = [
 ];
 
 /// More lights than this are chosen between too blindly to leave all to the choice.
-const FEW_LIGHTS: usize = 4;
+pub(crate) const FEW_LIGHTS: usize = 4;
 
 /// Fills `packed.lights`, the triangles' light indices and the frame's light fields.
 pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {

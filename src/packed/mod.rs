@@ -14,6 +14,7 @@ mod test_support;
 mod tests;
 
 pub use build::{PackError, next_anchor};
+pub(crate) use lights::FEW_LIGHTS;
 pub use records::*;
 pub use shutter::{Instant, instants, row_ends, traced_shutter};
 #[cfg(test)]

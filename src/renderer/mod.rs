@@ -102,7 +102,7 @@ pub enum RenderError {
 pub struct Seconds {
     /// Acceleration structures, packing and the albedo estimate.
     pub build: f64,
-    /// Shader compilation.
+    /// Opening the device, and what it alone needs: shaders, and trees in its own form.
     pub compile: f64,
     /// The pilot.
     pub look_ahead: f64,

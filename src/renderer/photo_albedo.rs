@@ -11,7 +11,10 @@ use crate::accel::{Hit, Ray};
 use crate::camera::lens::camera_ray;
 use crate::cpu::contribution::ESTIMATOR_DIRECT;
 use crate::cpu::render::render_first_hit;
-use crate::packed::{FRAME_AOVS, Frame, MATERIAL_PHOTO_ALBEDO, NONE, PackedScene};
+use crate::packed::{
+    FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, Frame,
+    MATERIAL_PHOTO_ALBEDO, NONE, PackedScene,
+};
 use crate::scene::Photo;
 
 /// Largest albedo: above it paths would hardly end, and no diffuse surface is whiter.
@@ -152,6 +155,8 @@ struct Grid {
 fn trace_grid(scene: &mut PackedScene, seen: &[Seen]) -> Grid {
     let kept = scene.frame;
     scene.frame.aperture_radius = 0.0;
+    // Savings left out do not change the estimate, whichever came first.
+    scene.frame.flags &= !(FRAME_BOTH_SHADOWS | FRAME_NO_CONES | FRAME_NO_LAST_VERTEX);
     scene.frame.flags |= FRAME_AOVS;
     scene.frame.rays_total = GRID_RAYS;
     scene.frame.estimator = ESTIMATOR_DIRECT;

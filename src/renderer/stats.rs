@@ -26,7 +26,7 @@ pub struct StatsSeconds {
     pub load: f64,
     /// Acceleration structures and whatever else precedes the first ray.
     pub build: f64,
-    /// Shaders.
+    /// The GPU's device, shaders and trees.
     pub compile: f64,
     /// The pilot, which plans the samples.
     pub look_ahead: f64,

@@ -20,7 +20,7 @@ const ENVIRONMENT_GAIN: f32 = 2.0;
 /// Environment directions tried for blocked light.
 const ENVIRONMENT_TRIALS: u32 = 16;
 /// Lights examined; scenes with more get certainty instead of an estimate.
-const MAX_LIGHTS_EXAMINED: usize = 32;
+pub(crate) const MAX_LIGHTS_EXAMINED: usize = 32;
 
 /// The lights that decide how much of the real world's light something virtual may change.
 pub struct PilotLights<'a> {

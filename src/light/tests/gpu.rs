@@ -24,7 +24,7 @@ output_vec3(4u, s.radiance);
 output_f32(7u, s.pdf);
 output_f32(8u, env_arriving(direction).pdf);
 output_vec3(9u, env_radiance(direction));
-let c = cone_sample(position, direction, u.xyz);
+let c = cone_sample(position, direction, u.x, u.yz);
 output_vec3(12u, c.direction);
 output_f32(15u, c.pdf);
 output_f32(16u, cone_pdf(position, direction, s.direction));

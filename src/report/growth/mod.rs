@@ -12,13 +12,15 @@ use serde::Serialize;
 
 use super::Plan;
 use super::fit::{Fit, log_log_fit};
+use crate::cpu::pilot::MAX_LIGHTS_EXAMINED;
+use crate::packed::{FEW_LIGHTS, MAX_SPHERES};
 use crate::scene::Choice;
 
 pub use measure::grow;
 pub use plot::growth_plot;
 pub use table::{growth_csv, growth_markdown, growth_text};
 
-/// An exponent is worse than expected if it lies above the range by more than this and by two of its standard errors.
+/// An exponent is worse than expected if it lies above the range by more than this and by two of the errors that the runs' spread explains.
 const SLACK: f64 = 0.03;
 
 /// What grows.
@@ -31,7 +33,7 @@ pub enum Law {
     /// Pixels of one view.
     Pixels,
     RaysPerPixel,
-    /// Virtual objects that cover the same area and have the same triangles all together.
+    /// Virtual objects that cover the same area and have about the same triangles all together.
     Objects,
     /// Area lights that share one panel.
     Lights,
@@ -88,8 +90,8 @@ impl Law {
     }
 
     /// Why that range.
-    pub fn reason(self) -> &'static str {
-        match self {
+    pub fn reason(self) -> String {
+        let reason = match self {
             Self::Build => {
                 "sorting and merging n boxes is O(n log n); the logarithm doubles from 1e3 to 1e6, which adds 0.1 to the exponent"
             }
@@ -104,14 +106,19 @@ impl Law {
                  most from 8 a pixel on and spends more where they are: a step, no slope)"
             }
             Self::Objects => {
-                "covered area and triangles are held, the search is O(log n), and 16 spheres bound any number of objects; only the outlines grow, \
-                 with the root of the number, and with them the rays of edge pixels"
+                return format!(
+                    "covered area and, within 12%, triangles are held, the search is O(log n), and {MAX_SPHERES} spheres bound any number of objects; \
+                     only the outlines grow, with the root of the number, and with them the rays of edge pixels"
+                );
             }
             Self::Lights => {
-                "the panel is held; a light is drawn in O(1) from an alias table. (`direct` takes two steps up: it drops rays that a few lights make needless, and plans fewer \
-                 rays where none of up to 32 lights can be blocked)"
+                return format!(
+                    "the panel is held; a light is drawn in O(1) from an alias table. (`direct` takes two steps up: it drops rays that up to {FEW_LIGHTS} \
+                     lights make needless, and plans fewer rays where none of up to {MAX_LIGHTS_EXAMINED} lights can be blocked)"
+                );
             }
-        }
+        };
+        reason.to_owned()
     }
 }
 
@@ -127,6 +134,8 @@ pub struct Curve {
     pub cost: &'static str,
     /// Of seconds over work; `None` of fewer than two sizes.
     pub exponent: Option<Fit>,
+    /// Error of the exponent that the spread of the runs explains; `None` where a size ran once.
+    pub exponent_noise: Option<f64>,
     /// Of rays traced over work.
     pub rays_exponent: Option<Fit>,
     /// Ascending.
@@ -162,25 +171,50 @@ impl Curve {
             )
         };
         let (exponent, rays_exponent) = (fit(|p| p.secs), fit(|p| p.rays as f64));
+        let exponent_noise = slope_noise(&points);
         Self {
             law,
             method,
             device,
             cost,
             exponent,
+            exponent_noise,
             rays_exponent,
             points,
         }
     }
 
-    /// The cost grows faster than the algorithms promise, and not by chance.
+    /// The cost grows faster than the algorithms promise by more than the runs' spread explains. How well a power law fits does not matter: a
+    /// step is a growth too.
     pub fn is_worse_than_expected(&self) -> bool {
         let (_, most) = self.law.expected();
         self.exponent.is_some_and(|fit| {
-            let doubt = 2.0 * fit.standard_error.unwrap_or(f64::INFINITY);
+            let doubt = 2.0 * self.exponent_noise.unwrap_or(f64::INFINITY);
             fit.slope - most > doubt.max(SLACK)
         })
     }
+}
+
+/// The error of the slope of log seconds over log work, from those of the points: the spread of each one's runs, for the least of them is no surer
+/// than any.
+fn slope_noise(points: &[Point]) -> Option<f64> {
+    let count = points.len() as f64;
+    let logs: Vec<f64> = points.iter().map(|p| (p.work as f64).ln()).collect();
+    let mean = logs.iter().sum::<f64>() / count;
+    let spread: f64 = logs.iter().map(|x| (x - mean).powi(2)).sum();
+    let variances: Option<Vec<f64>> = points.iter().map(|p| log_variance(&p.runs)).collect();
+    let sum: f64 = (logs.iter().zip(variances?))
+        .map(|(x, variance)| (x - mean).powi(2) * variance)
+        .sum();
+    (spread > 0.0).then(|| sum.sqrt() / spread)
+}
+
+/// Variance of the logarithms of two or more numbers.
+fn log_variance(runs: &[f64]) -> Option<f64> {
+    let count = runs.len() as f64;
+    let mean = runs.iter().map(|r| r.ln()).sum::<f64>() / count;
+    let squares: f64 = runs.iter().map(|r| (r.ln() - mean).powi(2)).sum();
+    (runs.len() > 1).then(|| squares / (count - 1.0))
 }
 
 fn by_name<S: serde::Serializer>(law: &Law, serializer: S) -> Result<S::Ok, S::Error> {
@@ -236,12 +270,44 @@ mod tests {
         assert!((curve(Law::Objects, 0.5).rays_exponent.unwrap().slope - 1.0).abs() < 1e-12);
     }
 
+    /// The same sizes with other seconds.
+    fn timed(law: Law, secs: [f64; 5], spread: f64) -> Curve {
+        let mut points = curve(law, 0.0).points;
+        for (point, secs) in points.iter_mut().zip(secs) {
+            point.secs = secs;
+            point.runs = vec![secs, secs * (1.0 + spread), secs * (1.0 + 0.5 * spread)];
+        }
+        Curve::new(law, String::new(), String::new(), "cpu", points)
+    }
+
     #[test]
-    fn two_points_prove_nothing() {
-        let mut curve = curve(Law::Objects, 0.9);
-        curve.points.truncate(2);
-        let points = std::mem::take(&mut curve.points);
-        let of_two = Curve::new(curve.law, curve.method, curve.device, curve.cost, points);
-        assert!(of_two.exponent.is_some() && !of_two.is_worse_than_expected());
+    fn a_step_is_a_growth_and_noise_is_none() {
+        let step = [1.0, 1.0, 1.0, 2.0, 2.0];
+        assert!(timed(Law::Lights, step, 0.02).is_worse_than_expected());
+        assert!(timed(Law::Lights, [1.0, 1.0, 1.0, 1.0, 20.0], 0.02).is_worse_than_expected());
+        // Runs that differ by as much as the step explain it.
+        assert!(!timed(Law::Lights, step, 1.0).is_worse_than_expected());
+        assert!(!timed(Law::Lights, [1.0; 5], 0.02).is_worse_than_expected());
+    }
+
+    #[test]
+    fn the_noise_of_an_exponent_is_that_of_its_points() {
+        // Deviations from the mean of ln 4^k are -2..2 times ln 4, their squares sum to 10; the runs' ln have the standard deviation s.
+        let curve = timed(Law::Build, [1.0; 5], 0.1);
+        let runs = [1.0f64, 1.1, 1.05].map(f64::ln);
+        let mean = runs.iter().sum::<f64>() / 3.0;
+        let s = (runs.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / 2.0).sqrt();
+        let want = s / (10f64.sqrt() * 4f64.ln());
+        assert!((curve.exponent_noise.unwrap() / want - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn single_runs_prove_nothing() {
+        let mut points = curve(Law::Objects, 0.9).points;
+        for point in &mut points {
+            point.runs.truncate(1);
+        }
+        let once = Curve::new(Law::Objects, String::new(), String::new(), "cpu", points);
+        assert!(once.exponent.is_some() && !once.is_worse_than_expected());
     }
 }
