@@ -290,7 +290,9 @@ fn median(albedos: &mut [[f32; 4]]) -> Option<[f32; 4]> {
 mod tests {
     use super::*;
     use crate::packed::{test_mesh, test_scene};
-    use crate::scene::{EncodedPhoto, Environment, EnvironmentMap, Material, Object, Scene, Side};
+    use crate::scene::{
+        EncodedPhoto, Environment, EnvironmentMap, Light, LightKind, Material, Object, Scene, Side,
+    };
 
     /// A square that faces the camera from 1 m, with corners at x = `from` and x = `to`.
     fn wall(from: f32, to: f32) -> Object {
@@ -346,6 +348,36 @@ mod tests {
 
     fn close(found: &[f32; 4], expected: [f32; 3]) -> bool {
         (0..3).all(|c| (found[c] - expected[c]).abs() < 0.01)
+    }
+
+    /// Whichever came first, the savings to do without or the estimate.
+    #[test]
+    fn savings_left_out_do_not_change_the_estimate() {
+        let (mut scene, photo) = scene();
+        scene.environment = None;
+        scene.lights = vec![Light {
+            side: Side::Real,
+            kind: LightKind::Quad {
+                corner: [-0.5, -0.5, 0.5],
+                edge_u: [0.0, 1.0, 0.0],
+                edge_v: [1.0, 0.0, 0.0],
+                radiance: [4.0; 3],
+            },
+        }];
+        let estimate = |flags: u32| {
+            let mut packed = PackedScene::build(&scene).expect("packs");
+            packed.frame.flags |= flags;
+            estimate_photo_albedo(&mut packed, &photo);
+            assert_eq!(packed.frame.flags & flags, flags, "the renders keep theirs");
+            let seen: f32 = (0..64)
+                .map(|i| render_first_hit(&packed, 16 * 33, i).0.x)
+                .sum();
+            (seen, packed.photo_albedo)
+        };
+        let (with, without) = (estimate(0), estimate(FRAME_NO_LAST_VERTEX));
+        assert!(with.0 > 0.0);
+        assert_ne!(with.0, without.0, "control: other samples");
+        assert_eq!(with.1, without.1);
     }
 
     #[test]
