@@ -6,7 +6,8 @@ mod device;
 mod scenes;
 
 use mixray::gpu::{Features, GpuBackend, harness::test_device};
-use mixray::renderer::{Skip, Without};
+use mixray::renderer::{ErrorGoal, Renderer, Skip, Without};
+use mixray::scene::BackendChoice;
 
 use agreement::{
     Difference, assert_agreement, assert_scene_agrees, backend_for, gpu_film, load, planes,
@@ -105,6 +106,49 @@ fn without_its_savings() {
         let (_, usual) = agreement::cpu_film(&renderer(scene, case.all_planes), case.all_planes);
         assert_ne!(rays, usual, "{name} {without:?}");
     }
+}
+
+/// To an error both backends take the same samples and state the same error.
+#[test]
+fn adaptive_renders() {
+    if test_device().is_none() {
+        return;
+    }
+    let case = case("matt_with_an_occluder_under_a_quad");
+    let to_error = |backend: BackendChoice, standard_error: f64| {
+        let mut scene = load(&case.text());
+        scene.settings.backend = backend;
+        let mut renderer = renderer(scene, false);
+        let goal = ErrorGoal {
+            standard_error: Some(standard_error),
+            noise: None,
+            max_rays_per_pixel: 1024,
+        };
+        (renderer.render_to_error(&goal, &|| false, &mut |_| ())).expect("it renders");
+        renderer
+    };
+    let goal = 0.002;
+    let (cpu, gpu) = (
+        to_error(BackendChoice::Cpu, goal),
+        to_error(BackendChoice::Gpu, goal),
+    );
+    assert_eq!((cpu.backend_name(), gpu.backend_name()), ("cpu", "gpu"));
+    let samples = |r: &Renderer| r.film().pixels.iter().map(|p| p.n).collect::<Vec<_>>();
+    assert!(samples(&cpu) == samples(&gpu));
+    let (least, most) = (
+        samples(&cpu).into_iter().min(),
+        samples(&cpu).into_iter().max(),
+    );
+    assert!(most > least, "some tiles take more than others: {least:?}");
+    let expected = planes(&cpu, cpu.film());
+    let difference = Difference::between(&expected, &planes(&gpu, gpu.film()));
+    let stated = |r: &Renderer| r.stated().expect("it has a goal").rms();
+    eprintln!("{difference:?}; stated {} {}", stated(&cpu), stated(&gpu));
+    assert!(difference.agrees(), "{difference:?}");
+    assert!((stated(&gpu) / stated(&cpu) - 1.0).abs() < 1e-3);
+    let control = to_error(BackendChoice::Cpu, 0.5 * goal);
+    assert!(samples(&cpu) != samples(&control), "control: another goal");
+    assert!((stated(&control) / stated(&cpu) - 1.0).abs() > 0.1);
 }
 
 /// Kernels that hold more than the scene needs give the same film up to rounding.
