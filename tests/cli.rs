@@ -160,6 +160,70 @@ fn every_kind_of_output_is_written() {
     );
 }
 
+/// Processor seconds are those of the look-ahead and the render, and grow with the rays.
+#[test]
+fn stats_tell_the_processors_seconds() {
+    let folder = Folder::new(&format!("{CAMERA}{VIRTUAL}"));
+    let seconds = |rpp: &str| {
+        let arguments = ["render", "scene.toml", "--backend", "cpu", "--rpp", rpp];
+        let output = command(folder.0.path(), &arguments)
+            .args(["-o", "a.png", "--stats", "s.json"])
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let text = std::fs::read_to_string(folder.path("s.json")).unwrap();
+        let stats: serde_json::Value = serde_json::from_str(&text).unwrap();
+        ["cpu", "look_ahead", "render"].map(|name| stats["seconds"][name].as_f64().unwrap())
+    };
+    let [few, look_ahead, _] = seconds("1");
+    assert!(few > 0.0 && look_ahead > 0.0, "{few} {look_ahead}");
+    // Some 4 million rays against 400.
+    let [many, look_ahead, render] = seconds("10000");
+    assert!(many > 2.0 * few, "{many} {few}");
+    assert!(
+        look_ahead > 0.0 && look_ahead < render,
+        "{look_ahead} {render}"
+    );
+}
+
+/// What is switched off in vain is said; what is not, is not.
+#[test]
+fn savings_that_a_render_has_not_are_told() {
+    let folder = Folder::new(&format!("{CAMERA}{VIRTUAL}"));
+    let says = |flags: &str| {
+        let common = "render scene.toml --backend cpu --rpp 16 -o a.png";
+        let arguments: Vec<&str> = (common.split(' ')).chain(flags.split(' ')).collect();
+        let output = folder.run(&arguments);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        (stderr(&output), stdout(&output))
+    };
+    for flags in [
+        "--no-skip adaptive",
+        "--no-skip camera-noise",
+        "--no-skip specialisation",
+        "--no-skip cones --estimator paper",
+        "--no-skip virtual-first --estimator paper",
+        "--no-skip last-vertex --estimator paper",
+        "--target-error 0.1 --no-skip camera-noise",
+    ] {
+        let (message, _) = says(flags);
+        assert!(
+            message.contains("changes nothing here"),
+            "{flags}: {message}"
+        );
+    }
+    for flags in ["--no-skip cones", "--target-error 0.1 --no-skip adaptive"] {
+        assert_eq!(says(flags).0, "", "{flags}");
+    }
+    let noise = "--stop-at camera-noise --camera-noise 0.02,0.5";
+    assert!(says(noise).1.contains("tiles stay above the goal"));
+    let (_, without) = says(&format!("{noise} --no-skip camera-noise"));
+    assert!(
+        !without.contains("above the goal"),
+        "there is none: {without}"
+    );
+}
+
 #[test]
 fn unusable_scenes_are_one_line_and_exit_code_2() {
     let folder = Folder::new(&format!("{CAMERA}vertical_fov = 3\n"));

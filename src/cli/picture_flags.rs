@@ -68,13 +68,18 @@ impl PictureFlags {
 
     /// Once, before anything runs on several threads.
     pub(super) fn start_threads(&self) -> Result<(), Failure> {
-        if let Some(threads) = self.threads {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(usize::from(threads))
-                .build_global()?;
-        }
-        Ok(())
+        start_threads(self.threads)
     }
+}
+
+/// That many for the CPU's work, if a number is given; once.
+pub(super) fn start_threads(threads: Option<u16>) -> Result<(), Failure> {
+    if let Some(threads) = threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(threads))
+            .build_global()?;
+    }
+    Ok(())
 }
 
 pub(super) fn png_bits(name: String) -> PngBits {

@@ -169,6 +169,9 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         filter: job.filter,
     };
     let mut renderer = Renderer::new(scene, options)?;
+    let without = renderer.without();
+    say_idle(&renderer, goal.as_ref());
+    let goal = goal.map(|goal| goal.without(without));
     let interrupted = interrupt::watch()?;
     let (first, end) = (job.range).unwrap_or((0, renderer.scene().settings.rays_per_pixel));
     let unit = if goal.is_some() {
@@ -205,7 +208,8 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     if let Some(path) = &job.flags.stats {
         write_text(path, &stats.to_json())?;
     }
-    print(&summary::text(&renderer, &stats, &targets))?;
+    let aims = goal.is_some_and(|goal| !goal.takes_all_rays());
+    print(&summary::text(&renderer, &stats, &targets, aims))?;
     if job.range.is_some() && interrupted.is_set() {
         say("warning", "the range is not complete: it cannot be merged");
     }
@@ -257,7 +261,9 @@ pub(super) fn write(
                 let planes = renderer.planes();
                 if let Some(range) = film_range {
                     let film = renderer.film();
-                    let note = FilmNote::new(renderer.scene(), range, renderer.without());
+                    let on_gpu = renderer.gpu_device().is_some();
+                    let without = renderer.without().of_films(on_gpu);
+                    let note = FilmNote::new(renderer.scene(), range, without);
                     write_film(target, &picture, &planes, &metadata, film, &note)?;
                 } else {
                     write_exr(target, &picture, &planes, &metadata)?;
@@ -293,6 +299,18 @@ pub(super) fn camera_noise(text: &str) -> Result<CameraNoise, Failure> {
                 .map_err(|problem| Failure(format!("{text}: {problem}")))?;
             Ok(CameraNoise { fit: profile.fit })
         }
+    }
+}
+
+/// Says which savings were switched off in vain.
+pub(super) fn say_idle(renderer: &Renderer, goal: Option<&ErrorGoal>) {
+    let estimator = renderer.scene().settings.estimator;
+    let on_gpu = renderer.gpu_device().is_some();
+    for (name, reason) in renderer.without().idle(estimator, on_gpu, goal) {
+        say(
+            "note",
+            &format!("--no-skip {name} changes nothing here: {reason}"),
+        );
     }
 }
 

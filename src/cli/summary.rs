@@ -3,7 +3,13 @@
 use crate::output::Target;
 use crate::renderer::{Renderer, SCRAMBLES, Stated, Stats};
 
-pub(super) fn text(renderer: &Renderer, stats: &Stats, targets: &[Target]) -> String {
+/// `to_goal`: the render could end before its rays were spent.
+pub(super) fn text(
+    renderer: &Renderer,
+    stats: &Stats,
+    targets: &[Target],
+    to_goal: bool,
+) -> String {
     let film = renderer.film();
     let rays = match renderer.stated() {
         Some(stated) => format!(
@@ -22,7 +28,7 @@ pub(super) fn text(renderer: &Renderer, stats: &Stats, targets: &[Target]) -> St
         );
     }
     let error = match renderer.stated() {
-        Some(stated) => from_scrambles(stated),
+        Some(stated) => from_scrambles(stated, to_goal),
         None => format!(
             "{:.2e} RMS, linear: an upper estimate, from the variance of the samples",
             stats.error.rms
@@ -35,18 +41,23 @@ pub(super) fn text(renderer: &Renderer, stats: &Stats, targets: &[Target]) -> St
     out
 }
 
-fn from_scrambles(stated: &Stated) -> String {
+fn from_scrambles(stated: &Stated, to_goal: bool) -> String {
     let short = if stated.scrambles < SCRAMBLES {
         " (ended early: too few to trust)"
     } else {
         ""
     };
+    let above = match to_goal {
+        true => format!(
+            "; {} of {} tiles stay above the goal",
+            stated.tiles_above_goal, stated.tiles
+        ),
+        false => String::new(),
+    };
     format!(
-        "{:.2e} RMS, linear: a standard error, from {} independent scrambles{short}; {} of {} tiles stay above the goal",
+        "{:.2e} RMS, linear: a standard error, from {} independent scrambles{short}{above}",
         stated.rms(),
-        stated.scrambles,
-        stated.tiles_above_goal,
-        stated.tiles
+        stated.scrambles
     )
 }
 

@@ -28,7 +28,7 @@ pub struct FilmNote {
     pub estimator: Estimator,
     pub sampler: SamplerKind,
     pub composite: Composite,
-    /// Savings that were left out: real rays that edge pixels lack are traced as the others were.
+    /// Savings that were left out, as far as films show it ([`Without::of_films`]): real rays that edge pixels lack are traced as the others were.
     pub without: Without,
 }
 
@@ -47,6 +47,8 @@ const NOTE_NAMES: [&str; 12] = [
     "mixray.film.composite",
     "mixray.film.without",
 ];
+/// Where the savings left out stand in [`NOTE_NAMES`].
+const WITHOUT: usize = 11;
 
 impl FilmNote {
     /// Of a film that holds these samples of the scene's rays per pixel.
@@ -125,7 +127,7 @@ impl FilmNote {
         ]
     }
 
-    fn from_texts(text: &dyn Fn(usize) -> Option<String>) -> Option<Self> {
+    fn from_texts(text: &dyn Fn(usize) -> Option<String>, without: Without) -> Option<Self> {
         let number = |i| text(i)?.parse::<u32>().ok();
         let note = Self {
             version: text(0)?,
@@ -138,7 +140,7 @@ impl FilmNote {
             estimator: Estimator::from_name(&text(8)?)?,
             sampler: SamplerKind::from_name(&text(9)?)?,
             composite: Composite::from_name(&text(10)?)?,
-            without: Without::from_names(&text(11)?)?,
+            without,
         };
         let (first, end) = note.range;
         let is_range = first < end && end <= note.total;
@@ -186,7 +188,16 @@ pub fn write_film(
 /// In one line: the file cannot be read, or holds no film.
 pub fn read_film(path: &Path) -> Result<(Film, FilmNote), String> {
     let file = ChannelFile::read(path)?;
-    let note = FilmNote::from_texts(&|i| file.texts.get(NOTE_NAMES[i]).cloned());
+    let text = |i: usize| file.texts.get(NOTE_NAMES[i]).cloned();
+    // Films had no such attribute before savings could be left out.
+    let names = text(WITHOUT).unwrap_or_default();
+    let without = Without::from_names(&names).ok_or_else(|| {
+        format!(
+            "{}: was rendered without savings that this build does not know ({names}); merge it with the build that rendered it, or render it again",
+            path.display()
+        )
+    })?;
+    let note = FilmNote::from_texts(&text, without);
     note.and_then(|note| Some((film_of(&file, &note)?, note)))
         .ok_or_else(|| {
             format!(
@@ -421,6 +432,16 @@ mod tests {
         plain.guides.clear();
         let (_folder, target) = written(&plain);
         assert_eq!(read_film(target.path()).unwrap().0, plain);
+    }
+
+    #[test]
+    fn a_note_without_savings_leaves_none_out() {
+        let texts = note().texts();
+        let text = |i: usize| texts.get(i).cloned();
+        let read = FilmNote::from_texts(&text, Without::default()).unwrap();
+        assert_eq!(read.without, Without::default());
+        assert!(read.mismatch(&note()).is_some(), "control");
+        assert_eq!(Without::from_names(""), Some(Without::default()));
     }
 
     #[test]

@@ -73,11 +73,7 @@ impl Renderer {
         if !self.instants.is_empty() {
             return Err(RenderError::MovingGoal);
         }
-        let stops_at_noise = !self.options.without.contains(Skip::CameraNoise);
-        let goal = &ErrorGoal {
-            noise: goal.noise.filter(|_| stops_at_noise),
-            ..*goal
-        };
+        let goal = &goal.without(self.options.without);
         if self.stated.is_some() {
             self.look_ahead();
         }

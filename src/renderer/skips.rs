@@ -1,10 +1,11 @@
 //! The savings that can be switched off, to measure what each is worth.
 
+use super::ErrorGoal;
 use crate::packed::{
     FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL,
     PIXEL_OUT_OF_REACH, PixelInfo,
 };
-use crate::scene::Choice;
+use crate::scene::{Choice, Estimator};
 
 /// Work that is left out because it cannot matter, or seldom does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,10 +69,71 @@ impl Without {
         }
     }
 
-    /// What [`Without::names`] has written.
+    /// What [`Without::names`] has written, or nothing.
     pub fn from_names(names: &str) -> Option<Self> {
-        let names = names.split(',').filter(|name| *name != "none");
+        let names = names
+            .split(',')
+            .filter(|name| !matches!(*name, "" | "none"));
         names.map(Skip::from_name).collect()
+    }
+
+    /// Those without which a film rendered to its rays per pixel may hold other sums: the others only save time, or act with a goal alone.
+    /// `on_gpu`: shaders may render it, which round otherwise.
+    #[must_use]
+    pub fn of_films(self, on_gpu: bool) -> Self {
+        self.filtered(|skip| match skip {
+            Skip::VirtualFirst | Skip::Adaptive | Skip::CameraNoise => false,
+            Skip::Specialisation => on_gpu,
+            Skip::OutOfReach
+            | Skip::Plan
+            | Skip::Beams
+            | Skip::EdgeReal
+            | Skip::Cones
+            | Skip::LastVertex => true,
+        })
+    }
+
+    /// Those of [`Without::of_films`] that the composite shows too, and not only the other planes.
+    #[must_use]
+    pub fn of_pictures(self, on_gpu: bool) -> Self {
+        let proven = |skip| matches!(skip, Skip::OutOfReach | Skip::EdgeReal);
+        self.of_films(on_gpu).filtered(|skip| !proven(skip))
+    }
+
+    /// Those that a render like this has none of, each with the reason: switched off or not, they do nothing.
+    pub fn idle(
+        self,
+        estimator: Estimator,
+        on_gpu: bool,
+        goal: Option<&ErrorGoal>,
+    ) -> Vec<(&'static str, &'static str)> {
+        let reason = |skip| match skip {
+            Skip::Adaptive if goal.is_none() => Some("there is no goal"),
+            Skip::CameraNoise if goal.is_none_or(|goal| goal.noise.is_none()) => {
+                Some("the goal is not the camera's noise")
+            }
+            Skip::Specialisation if !on_gpu => Some("the CPU renders"),
+            Skip::Plan
+            | Skip::Beams
+            | Skip::EdgeReal
+            | Skip::VirtualFirst
+            | Skip::Cones
+            | Skip::LastVertex
+                if estimator == Estimator::Paper =>
+            {
+                Some("the estimator is paper")
+            }
+            _ => None,
+        };
+        let off = Skip::CHOICES.iter().filter(|(_, s)| self.contains(*s));
+        off.filter_map(|&(name, skip)| Some((name, reason(skip)?)))
+            .collect()
+    }
+
+    fn filtered(self, keep: impl Fn(Skip) -> bool) -> Self {
+        let all = Skip::CHOICES.iter().map(|&(_, skip)| skip);
+        all.filter(|&skip| self.contains(skip) && keep(skip))
+            .collect()
     }
 
     /// Takes the estimator's share of the savings back.
@@ -154,5 +216,46 @@ mod tests {
             assert_eq!(Without::from_names(&without.names()), Some(without));
         }
         assert_eq!(Without::from_names("plan,cone"), None);
+    }
+
+    #[test]
+    fn only_what_may_show_is_kept_with_films_and_pictures() {
+        let all: Without = Skip::CHOICES.iter().map(|&(_, skip)| skip).collect();
+        let of_pictures = "plan,beams,cones,last-vertex";
+        assert_eq!(all.of_pictures(false).names(), of_pictures);
+        let of_films = "out-of-reach,plan,beams,edge-real,cones,last-vertex";
+        assert_eq!(all.of_films(false).names(), of_films);
+        let on_gpu = format!("{of_films},specialisation");
+        assert_eq!(all.of_films(true).names(), on_gpu);
+        assert_eq!(Without::default().of_films(true), Without::default());
+    }
+
+    #[test]
+    fn what_does_nothing_is_told() {
+        let all: Without = Skip::CHOICES.iter().map(|&(_, skip)| skip).collect();
+        let names = |estimator, on_gpu, goal: Option<&ErrorGoal>| {
+            let idle = all.idle(estimator, on_gpu, goal);
+            idle.iter().map(|(name, _)| *name).collect::<Vec<_>>()
+        };
+        let goal = ErrorGoal {
+            standard_error: Some(0.01),
+            noise: None,
+            max_rays_per_pixel: 64,
+        };
+        let goals = ["adaptive", "camera-noise"];
+        assert_eq!(names(Estimator::Direct, true, None), goals);
+        assert_eq!(
+            names(Estimator::Direct, false, Some(&goal)),
+            ["specialisation", "camera-noise"]
+        );
+        let noise = ErrorGoal {
+            noise: Some(super::super::CameraNoise {
+                fit: [crate::scene::NoiseFit { a: 0.02, b: 0.5 }; 3],
+            }),
+            ..goal
+        };
+        assert!(names(Estimator::Direct, true, Some(&noise)).is_empty());
+        let left = all.0.count_ones() as usize - names(Estimator::Paper, true, Some(&noise)).len();
+        assert_eq!(left, 4, "out-of-reach, specialisation and the goals'");
     }
 }

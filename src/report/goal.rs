@@ -22,11 +22,16 @@ pub enum Aim {
 }
 
 impl Goal {
-    /// "to error 0.004", "to camera noise".
+    /// "to error 0.004", "to camera noise 0.02 y + 0.5" (sigma^2 of 8-bit codes y; of each channel where they differ).
     pub fn label(&self) -> String {
         match self.aim {
             Aim::TargetError(error) => format!("to error {error}"),
-            Aim::CameraNoise(_) => "to camera noise".to_owned(),
+            Aim::CameraNoise(noise) => {
+                let fits = noise.fit.map(|fit| format!("{} y + {}", fit.a, fit.b));
+                let same = fits.iter().all(|fit| *fit == fits[0]);
+                let shown = if same { &fits[..1] } else { &fits[..] };
+                format!("to camera noise {}", shown.join(" / "))
+            }
         }
     }
 }
@@ -63,5 +68,29 @@ mod as_numbers {
         Ok(CameraNoise {
             fit: numbers.map(|[a, b]| NoiseFit { a, b }),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::NoiseFit;
+
+    #[test]
+    fn other_goals_have_other_labels() {
+        let label = |fit| {
+            let goal = Goal {
+                aim: Aim::CameraNoise(CameraNoise { fit }),
+                max_rays_per_pixel: 64,
+            };
+            goal.label()
+        };
+        let [fit, other] = [(0.02, 0.5), (0.02, 0.25)].map(|(a, b)| NoiseFit { a, b });
+        assert_eq!(label([fit; 3]), "to camera noise 0.02 y + 0.5");
+        assert_eq!(
+            label([fit, other, fit]),
+            "to camera noise 0.02 y + 0.5 / 0.02 y + 0.25 / 0.02 y + 0.5"
+        );
+        assert_ne!(label([fit, other, other]), label([fit, fit, other]));
     }
 }

@@ -80,14 +80,10 @@ pub fn measure<'a>(
     cancelled: &(dyn Fn() -> bool + Sync),
     tick: &mut dyn FnMut(&str),
 ) -> Result<(Vec<Row>, Vec<Shot>), MeasureError> {
-    let (width, height) = (scene.camera.width, scene.camera.height);
     let mut subjects = Vec::new();
     for method in &plan.methods {
-        if let Some(Truth { picture, .. }) = truth(method)
-            && (picture.width, picture.height) != (width, height)
-        {
-            let (w, h) = (picture.width, picture.height);
-            return Err(MeasureError::Size(width, height, w, h));
+        if let Some(truth) = truth(method) {
+            check_size(scene, truth)?;
         }
         tick(&format!("{}: {}, warm-up", scene.name, method.label()));
         let mut subject = Subject::new(scene, *method)?;
@@ -166,15 +162,15 @@ pub fn rmse_of(
     truth: &Truth,
     cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Result<f64, MeasureError> {
+    check_size(scene, truth)?;
     let mut subject = Subject::new(scene, method)?;
     let (_, picture) = subject.run(Some(rays_per_pixel), seed, cancelled)?;
-    check_size(&picture, truth)?;
     Ok(Errors::of(&picture, truth).all.rmse)
 }
 
-fn check_size(picture: &Picture, truth: &Truth) -> Result<(), MeasureError> {
-    let size = |picture: &Picture| (picture.width, picture.height);
-    let ((width, height), (w, h)) = (size(picture), size(&truth.picture));
+fn check_size(scene: &Scene, truth: &Truth) -> Result<(), MeasureError> {
+    let (width, height) = (scene.camera.width, scene.camera.height);
+    let (w, h) = (truth.picture.width, truth.picture.height);
     match (width, height) == (w, h) {
         true => Ok(()),
         false => Err(MeasureError::Size(width, height, w, h)),

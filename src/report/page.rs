@@ -73,7 +73,14 @@ fn pictures(
     let mut levels: Vec<u32> = shots.iter().map(|s| s.rays_per_pixel).collect();
     levels.sort_unstable();
     levels.dedup();
-    let gain = gain(shots, levels.get(levels.len() / 2).copied(), &truth_of);
+    // A goal's limit is no number of rays that anything took.
+    let by_rays: Vec<&Shot> = (shots.iter().copied())
+        .filter(|s| s.method.goal.is_none())
+        .collect();
+    let mut counts: Vec<u32> = by_rays.iter().map(|s| s.rays_per_pixel).collect();
+    counts.sort_unstable();
+    counts.dedup();
+    let gain = gain(&by_rays, counts.get(counts.len() / 2).copied(), &truth_of);
     let mut out = format!(
         "<p>Pictures of each method's first run, and under each the difference from the reference times {gain} about grey: brighter is too bright.</p>\n<div class=\"scroll\"><table class=\"pictures\">\n"
     );
@@ -265,6 +272,25 @@ mod tests {
         assert!(page.contains("a &lt;b&gt;") && !page.contains("a <b>"));
         let outside = page.replace("http://www.w3.org/2000/svg", "");
         assert!(!outside.contains("http"), "nothing is fetched");
+        let mut with_goal = shots.clone();
+        with_goal.extend(shots.iter().map(|shot| Shot {
+            method: crate::report::Method {
+                goal: Some(crate::report::Goal {
+                    aim: crate::report::Aim::TargetError(0.1),
+                    max_rays_per_pixel: 1024,
+                }),
+                ..shot.method
+            },
+            rays_per_pixel: 1024,
+            scene: shot.scene.clone(),
+            picture: picture(0.9),
+        }));
+        let page_with_goal = super::page(&report, &plots, &with_goal, &truths).unwrap();
+        assert!(page_with_goal.contains("at most 1024"));
+        assert!(
+            page_with_goal.contains("times 2 about grey"),
+            "by the shots of a number of rays alone"
+        );
         for tag in ["table", "ul", "div", "pre", "svg", "td", "tr"] {
             let (open, close) = (format!("<{tag}"), format!("</{tag}>"));
             assert_eq!(

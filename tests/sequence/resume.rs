@@ -52,7 +52,7 @@ fn frames_of_a_folder() {
     assert_ne!(folder.frames_of("other"), whole, "control");
 }
 
-/// A saving that is left out makes other frames, which are not mixed with those that are there, unless it changes nothing at all.
+/// A saving that is left out makes other frames, which are not mixed with those that are there; what changes no bit is no obstacle.
 #[test]
 fn frames_without_a_saving() {
     let folder = Folder::new();
@@ -64,13 +64,24 @@ fn frames_without_a_saving() {
         folder.frames_of(out)
     };
     let usual = to("usual", &[]);
-    assert_eq!(to("virtual-first", &["--no-skip", "virtual-first"]), usual);
-    assert_ne!(
-        to("plan", &["--no-skip", "cones", "--no-skip", "beams"]),
-        usual
-    );
-    let again = ["--frames", "in", "-o", "usual", "--no-skip", "beams"];
-    folder.refused(&again, "--overwrite");
+    for saving in [
+        "virtual-first",
+        "edge-real",
+        "out-of-reach",
+        "specialisation",
+        "adaptive",
+        "camera-noise",
+    ] {
+        assert_eq!(to(saving, &["--no-skip", saving]), usual, "{saving}");
+        let again = ["--frames", "in", "-o", "usual", "--no-skip", saving];
+        let said = folder.sequence(&again);
+        assert!(said.contains("2 kept"), "{saving}: {said}");
+    }
+    for saving in ["cones", "beams"] {
+        assert_ne!(to(saving, &["--no-skip", saving]), usual, "{saving}");
+        let again = ["--frames", "in", "-o", "usual", "--no-skip", saving];
+        folder.refused(&again, "--overwrite");
+    }
 }
 
 #[test]

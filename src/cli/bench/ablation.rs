@@ -9,15 +9,48 @@ use crate::scene::{BackendChoice, Choice, Estimator, NoiseFit, Scene};
 
 /// sigma^2 = A y + B of a camera at a low gain, 8-bit codes, where nobody tells of another.
 const CAMERA_NOISE: [f64; 2] = [0.02, 0.5];
+/// Rays per pixel after which rows with a goal stop, where nobody tells otherwise.
+const GOAL_RAYS: u32 = 1024;
 
 impl Arguments {
     /// The savings to measure without.
     pub(super) fn savings(&self) -> Vec<Skip> {
-        if self.ablate {
-            Skip::CHOICES.iter().map(|&(_, skip)| skip).collect()
-        } else {
-            self.no_skip.clone()
+        let wanted = |skip| self.ablate || self.no_skip.contains(&skip);
+        let all = Skip::CHOICES.iter().map(|&(_, skip)| skip);
+        all.filter(|&skip| wanted(skip)).collect()
+    }
+
+    /// Rows that only `direct` has want it among the estimators.
+    pub(super) fn check_direct(&self) -> Result<(), Failure> {
+        if self.estimators.is_empty() || self.estimators.contains(&Estimator::Direct) {
+            return Ok(());
         }
+        for (flag, given) in [
+            ("--ablate", self.ablate),
+            ("--no-skip", !self.no_skip.is_empty()),
+            ("--target-error", self.target_error.is_some()),
+            ("--camera-noise", self.camera_noise.is_some()),
+            ("--filter", self.filter),
+        ] {
+            if given {
+                return Err(Failure(format!(
+                    "{flag} is of `direct`, which --estimators leaves out; expected it among them; add direct"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// A limit wants a goal.
+    pub(super) fn check_goals(&self) -> Result<(), Failure> {
+        let to_goal = self.target_error.is_some()
+            || self.camera_noise.is_some()
+            || self.savings().into_iter().any(wants_goal);
+        if self.goal_rpp.is_some() && !to_goal {
+            let message = "--goal-rpp limits rows with a goal, and there are none; expected a goal; add --target-error, --camera-noise or --ablate";
+            return Err(Failure(message.to_owned()));
+        }
+        Ok(())
     }
 }
 
@@ -54,10 +87,11 @@ impl Job {
         })
     }
 
-    /// Renders that a scene takes at the most.
-    pub(super) fn runs_of_a_scene(&self) -> u64 {
+    /// Renders that a scene takes.
+    pub(super) fn runs_of(&self, scene: &Scene) -> u64 {
         let savings = self.arguments.savings();
-        let goals = self.goals().into_iter().filter(|(_, wanted)| *wanted);
+        let rests = instants(scene).is_empty();
+        let goals = (self.goals().into_iter()).filter(|(_, wanted)| rests && *wanted);
         let rows = goals.map(|(skip, _)| 1 + u64::from(savings.contains(&skip)));
         let rows = rows.sum::<u64>() * self.plain().count() as u64;
         let plan = self.plan(self.arguments.rpp.clone(), self.methods.clone());
@@ -98,7 +132,7 @@ impl Job {
             let Some(aim) = aim else { continue };
             let goal = Some(Goal {
                 aim,
-                max_rays_per_pixel: self.arguments.goal_rpp,
+                max_rays_per_pixel: self.arguments.goal_rpp.unwrap_or(GOAL_RAYS),
             });
             for &method in self.plain() {
                 let method = Method { goal, ..method };

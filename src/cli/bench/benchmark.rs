@@ -24,7 +24,7 @@ pub(super) fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
     job.make_folder()?;
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
-    let steps = progress::Steps::new(scenes.len() as u64 * job.runs_of_a_scene());
+    let steps = progress::Steps::new(scenes.iter().map(|scene| job.runs_of(scene)).sum());
     let mut report = job.empty_report();
     let mut gallery = Gallery::default();
     let goal = ReferenceGoal {

@@ -15,6 +15,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::picture_flags::start_threads;
 use super::render::{above_zero, camera_noise, choice};
 use super::{Failure, Outcome, growth, print, say, stress};
 use crate::renderer::{CameraNoise, SCRAMBLES, Skip};
@@ -28,6 +29,31 @@ use files::read_report;
 use gpu_times::gpu_times;
 use paper::paper_table;
 use regression::compare;
+
+/// Flags that say how each row is measured.
+const OF_RUNS: [&str; 8] = [
+    "rpp",
+    "backends",
+    "estimators",
+    "samplers",
+    "composites",
+    "repeats",
+    "seed",
+    "shrink",
+];
+/// Flags of rows of error against time, which the other measurements do not have.
+const OF_ROWS: [&str; 8] = [
+    "reference",
+    "reference_error",
+    "reference_rpp",
+    "no_skip",
+    "target_error",
+    "camera_noise",
+    "goal_rpp",
+    "filter",
+];
+/// Flags of results.json.
+const OF_RESULTS: [&str; 3] = ["target_rmse", "against", "ablate"];
 
 /// Measures time against error
 ///
@@ -83,17 +109,17 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME", value_parser = choice::<Skip>())]
     no_skip: Vec<Skip>,
     /// Measure `direct` at this standard error too, root mean square over each tile of 16 x 16 pixels [default, for the saving adaptive: the RMSE
-    /// of `direct` at the middle of --rpp, to one digit]
+    /// of `direct` at the middle of --rpp, to one digit: rows for --against want it given, for what is measured may come out otherwise]
     #[arg(long, value_name = "E", value_parser = above_zero)]
     target_error: Option<f64>,
     /// Measure `direct` where it stops at this camera noise too: a file of `mixray noise calibrate`, or A,B as `mixray render` takes them [default, for
     /// the saving camera-noise: the scene's [noise], else 0.02,0.5]
     #[arg(long, value_name = "NOISE.toml|A,B")]
     camera_noise: Option<String>,
-    /// Rays per pixel after which rows with such a goal stop
-    #[arg(long, value_name = "N", default_value_t = 1024,
+    /// Rays per pixel after which rows with such a goal stop [default: 1024]
+    #[arg(long, value_name = "N",
         value_parser = clap::value_parser!(u32).range(i64::from(SCRAMBLES)..=i64::from(Settings::MAX_RAYS_PER_PIXEL)))]
-    goal_rpp: u32,
+    goal_rpp: Option<u32>,
     /// Measure `direct` with the preview filter too
     #[arg(long)]
     filter: bool,
@@ -107,22 +133,23 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "X", default_value_t = 0.05, value_parser = above_zero, requires = "against")]
     tolerance: f64,
     /// Measure nothing: take this results.json
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["scenes", "paper_table"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["scenes", "paper_table"], conflicts_with_all = OF_RUNS, conflicts_with_all = OF_ROWS)]
     report: Option<PathBuf>,
     /// The frame rates of Kan and Kaufmann 2012, Table 1, and ours on a scene like theirs
-    #[arg(long, conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate", "no_skip", "target_error", "camera_noise"])]
+    #[arg(long, conflicts_with_all = ["scenes", "rpp"], conflicts_with_all = OF_ROWS, conflicts_with_all = OF_RESULTS)]
     paper_table: bool,
     /// Numerical stability: a table of hard cases, each with the figure that it must hold against closed forms and f64 brute force; minutes.
     /// Writes stress.json, .csv and .md; exits with 1 if a case fails
-    #[arg(long, conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate", "no_skip", "target_error", "camera_noise", "report", "paper_table"])]
+    #[arg(long, conflicts_with_all = ["scenes", "rpp", "report", "paper_table"], conflicts_with_all = OF_ROWS, conflicts_with_all = OF_RESULTS)]
     stress: bool,
     /// Where the time of a GPU render goes, kernel by kernel, at each number of rays per pixel. Writes gpu-time.json
-    #[arg(long, conflicts_with_all = ["reference", "target_rmse", "against", "ablate", "no_skip", "target_error", "camera_noise", "report", "paper_table", "stress"])]
+    #[arg(long, conflicts_with_all = ["report", "paper_table", "stress"], conflicts_with_all = OF_ROWS, conflicts_with_all = OF_RESULTS)]
     gpu_time: bool,
     /// How the cost grows with triangles, pixels, rays, objects and lights: the exponent of each, beside what is expected; minutes.
     /// Writes growth.json, .csv and plots
     #[arg(long, value_name = "WHAT,WHAT", num_args = 0.., require_equals = true, value_delimiter = ',', value_parser = choice::<Law>(),
-        conflicts_with_all = ["scenes", "rpp", "reference", "target_rmse", "against", "ablate", "no_skip", "target_error", "camera_noise", "filter", "report", "paper_table", "stress", "gpu_time"])]
+        conflicts_with_all = ["scenes", "rpp", "report", "paper_table", "stress", "gpu_time"],
+        conflicts_with_all = OF_ROWS, conflicts_with_all = OF_RESULTS)]
     growth: Option<Vec<Law>>,
     /// Write the table into this page, between <!-- bench --> (<!-- ablate -->, <!-- paper-table -->, <!-- stress -->, <!-- gpu-time -->, <!-- growth -->) and
     /// <!-- end -->
@@ -151,6 +178,8 @@ impl Arguments {
             let message = "--reference is of one scene, and so must be the scenes";
             return Err(Failure(message.to_owned()));
         }
+        self.check_direct()?;
+        self.check_goals()?;
         let section = if self.stress {
             "stress"
         } else if self.growth.is_some() {
@@ -170,11 +199,7 @@ impl Arguments {
             .map(|path| Docs::open(path, section))
             .transpose()?;
         let earlier = self.against.as_deref().map(read_report).transpose()?;
-        if let Some(threads) = self.threads {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(usize::from(threads))
-                .build_global()?;
-        }
+        start_threads(self.threads)?;
         let cpu_only = self.backends.as_slice() == [BackendChoice::Cpu];
         let machine = Machine::this(!cpu_only && self.report.is_none());
         let camera_noise = self.camera_noise.as_deref().map(camera_noise).transpose()?;

@@ -10,15 +10,16 @@ use super::Arguments;
 use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
 use super::report::{Frames, Seconds, Stats};
 use crate::cli::progress::Steps;
+use crate::cli::render::say_idle;
 use crate::cli::{Failure, Outcome, interrupt, print, say};
 use crate::gpu::GpuStages;
 use crate::output::{check_writable, write_text};
 use crate::packed::next_anchor;
-use crate::renderer::{
-    Budget, FrameEdit, PreviousView, RayTotals, Renderer, RendererOptions, Without,
-};
+use crate::renderer::{Budget, FrameEdit, PreviousView, RayTotals, Renderer, RendererOptions};
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
-use crate::scene::{Camera, Exposure, Lens, MotionBlurMethod, Scene, fingerprint_of};
+use crate::scene::{
+    BackendChoice, Camera, Exposure, Lens, MotionBlurMethod, Scene, fingerprint_of,
+};
 use crate::stages::{Finished, finish};
 use crate::video::{FrameSink, FrameSource, Header, SinkPlan, VideoFrame};
 
@@ -225,6 +226,7 @@ impl Sequence<'_> {
                 ..RendererOptions::default()
             };
             let renderer = Renderer::new(scene, options)?;
+            say_idle(&renderer, None);
             let seconds = renderer.seconds();
             self.seconds.compile += seconds.compile;
             self.seconds.first_build += begin.elapsed().as_secs_f64() - seconds.compile;
@@ -319,7 +321,8 @@ impl Sequence<'_> {
             "{:?} {:?} {:?} {:?}",
             poses.entries, poses.intrinsics, self.files.intrinsics, self.rate
         );
-        let without: Without = arguments.flags.without();
+        let may_be_gpu = scene.settings.backend != BackendChoice::Cpu;
+        let without = arguments.flags.without().of_pictures(may_be_gpu);
         let fingerprint = fingerprint_of([
             env!("CARGO_PKG_VERSION"),
             &scene.fingerprint(),
