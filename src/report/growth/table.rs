@@ -105,7 +105,7 @@ fn preamble(machine: &Machine, curves: &[Curve]) -> Vec<String> {
         ),
         format!(
             "exponents: least squares in log over log, ± their standard error from the scatter about the line; \"worse\": above the expected range by more \
-             than two standard errors and {SLACK}"
+             than {SLACK} and twice what the spread of the runs explains"
         ),
     ];
     if let Some(gpu) = &machine.gpu {
