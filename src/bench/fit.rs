@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn the_standard_error_is_the_spread_of_slopes() {
         // Slopes of laws with scatter added anew must spread as each one's own standard error says.
-        let mut random = crate::stress::meshes::Random(5);
+        let mut random = crate::bench::stress::meshes::Random(5);
         let (mut slopes, mut stated) = (Vec::new(), 0.0);
         for _ in 0..4000 {
             // Sum of 12 uniform numbers: nearly normal, variance 1.

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::Case;
-use crate::report::Machine;
-use crate::report::table::{aligned, escaped};
+use crate::bench::Machine;
+use crate::bench::columns::{aligned, escaped};
 
 /// One case at one setting on one backend.
 #[derive(Clone, Debug, Serialize)]

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use super::{Curve, Law, SLACK};
-use crate::report::Machine;
-use crate::report::fit::Fit;
-use crate::report::table::aligned;
+use crate::bench::Machine;
+use crate::bench::columns::aligned;
+use crate::bench::fit::Fit;
 use crate::scene::Choice;
 
 const HEADS: [&str; 9] = [

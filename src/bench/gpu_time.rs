@@ -6,7 +6,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::Machine;
-use super::table::aligned;
+use super::columns::aligned;
 use crate::gpu::KernelSeconds;
 use crate::renderer::{Budget, RenderError, Renderer, RendererOptions};
 use crate::scene::{BackendChoice, Scene};

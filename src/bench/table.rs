@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::columns::{aligned, escaped};
 use super::{Figures, Reach, Report, Row};
 
 /// One heading and how a row's cell is written.
@@ -192,31 +193,6 @@ fn remarks(report: &Report) -> Vec<String> {
     lines
 }
 
-/// Columns by spaces: the first two to the left, numbers to the right.
-pub(crate) fn aligned(cells: &[Vec<String>]) -> String {
-    let columns = cells.iter().map(Vec::len).max().unwrap_or(0);
-    let width_of = |column: usize| {
-        let lengths = cells.iter().filter_map(|row| row.get(column));
-        lengths.map(|cell| cell.chars().count()).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..columns).map(width_of).collect();
-    let mut out = String::new();
-    for row in cells {
-        let mut line = String::new();
-        for (column, cell) in row.iter().enumerate() {
-            let width = widths[column];
-            if column < 2 {
-                let _ = write!(line, "{cell:<width$}  ");
-            } else {
-                let _ = write!(line, "{cell:>width$}  ");
-            }
-        }
-        out += line.trim_end();
-        out.push('\n');
-    }
-    out
-}
-
 /// One line a row with every figure, under a line of names.
 pub fn csv(report: &Report) -> String {
     let mut out = String::new();
@@ -302,19 +278,10 @@ pub fn csv(report: &Report) -> String {
     out
 }
 
-/// RFC 4180.
-pub(crate) fn escaped(value: &str) -> String {
-    if value.contains([',', '"', '\n']) {
-        format!("\"{}\"", value.replace('"', "\"\""))
-    } else {
-        value.to_owned()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::record::test_support::report;
+    use crate::bench::record::test_support::report;
 
     #[test]
     fn csv_has_one_value_a_name() {

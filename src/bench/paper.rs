@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::table::aligned;
+use super::columns::aligned;
 use super::{Machine, Row};
 
 /// A scene file: 720 x 576 pixels, about 100,000 triangles, an area light, a wide aperture.
@@ -137,7 +137,7 @@ pub fn paper_markdown(command: &str, machine: &Machine, rows: &[PaperRow]) -> St
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::record::test_support::report;
+    use crate::bench::record::test_support::report;
 
     #[test]
     fn the_scene_is_as_the_table_says() {

@@ -232,8 +232,8 @@ fn from_markdown(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bench::record::test_support::report;
     use crate::film::Picture;
-    use crate::report::record::test_support::report;
 
     #[test]
     fn the_page_shows_everything_and_asks_for_nothing() {
@@ -260,7 +260,7 @@ mod tests {
             mask: vec![0.0; 12],
         };
         let truths = [(scene, Composite::Additive, truth)];
-        let plots = crate::report::plots(&report).unwrap();
+        let plots = crate::bench::plots(&report).unwrap();
         let page = page(&report, &plots, &shots, &truths).unwrap();
         // A reference, two pictures, two differences.
         assert_eq!(page.matches("data:image/png;base64,").count(), 5);
@@ -274,9 +274,9 @@ mod tests {
         assert!(!outside.contains("http"), "nothing is fetched");
         let mut with_goal = shots.clone();
         with_goal.extend(shots.iter().map(|shot| Shot {
-            method: crate::report::Method {
-                goal: Some(crate::report::Goal {
-                    aim: crate::report::Aim::TargetError(0.1),
+            method: crate::bench::Method {
+                goal: Some(crate::bench::Goal {
+                    aim: crate::bench::Aim::TargetError(0.1),
                     max_rays_per_pixel: 1024,
                 }),
                 ..shot.method

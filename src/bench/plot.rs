@@ -112,8 +112,8 @@ fn chart_of(rows: &[&Row], axis: Axis) -> Option<Chart> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::chart::COLOURS;
-    use crate::report::record::test_support::report;
+    use crate::bench::chart::COLOURS;
+    use crate::bench::record::test_support::report;
 
     #[test]
     fn every_method_has_its_line() {

@@ -6,10 +6,10 @@ use super::backend::{Backend, Shown, StressError};
 use super::meshes::{Random, fan_of_slivers};
 use super::oracle::{Expected, expected};
 use super::scenes::{
-    camera, clear, contact, glowing, matt, mirror, named, object, place, placed, point_light,
-    scene, size, square, triangle,
+    clear, contact, glowing, mirror, named, placed, point_light, size, square, triangle,
 };
 use super::{At, Measured};
+use crate::bench::scenes::{camera, matt, object, place, scene};
 use crate::scene::shape::{cuboid, quad};
 use crate::scene::{Primitive, Scene, Side};
 

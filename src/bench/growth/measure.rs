@@ -6,8 +6,8 @@ use glam::Vec3;
 use super::scenes::{Step, ball, steps, triangle_counts};
 use super::{Curve, Law, Point};
 use crate::accel::WorldBvh;
+use crate::bench::measure::{MeasureError, Plan, Subject};
 use crate::packed::PackError;
-use crate::report::measure::{MeasureError, Plan, Subject};
 
 /// A build is repeated until the runs took this long together, so that the clock's grain does not show.
 const LEAST_BUILD_SECS: f64 = 0.05;
@@ -147,7 +147,7 @@ fn corners(triangles: u32) -> Vec<[Vec3; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::Method;
+    use crate::bench::Method;
     use crate::scene::{BackendChoice, Composite, Estimator, SamplerKind};
 
     #[test]

@@ -1,7 +1,7 @@
 //! Seconds against work, log over log, a line a method.
 
 use super::{Curve, Law};
-use crate::report::chart::{Chart, Guide, Legend, padded, ticks_at};
+use crate::bench::chart::{Chart, Guide, Legend, padded, ticks_at};
 use crate::scene::Choice;
 
 /// Decades that the seconds span at least: a flat line shall look flat.

@@ -238,8 +238,8 @@ mod by_name {
 #[cfg(test)]
 pub(super) mod test_support {
     use super::*;
+    use crate::bench::{Aim, Figures};
     use crate::renderer::CameraNoise;
-    use crate::report::{Aim, Figures};
     use crate::scene::NoiseFit;
 
     /// Two rows of two runs each.

@@ -1,10 +1,12 @@
-//! Time against error: what `mixray bench` measures and what is made of it.
+//! Measurement: what `mixray bench` does.
 //!
 //! [`measure`] renders methods in turns against a [`Truth`] that [`reference`] makes; [`Report`] keeps the figures, and the other modules
-//! make tables, plots and a page of it or compare it with an earlier one.
+//! make tables, plots and a page of it or compare it with an earlier one. [`grow`] finds how the cost grows with the work, [`gpu_time`] where a
+//! GPU's time goes, and [`stress`] what breaks renderers.
 
 mod against;
 mod chart;
+mod columns;
 mod docs;
 mod errors;
 mod fit;
@@ -19,8 +21,10 @@ mod pictures;
 mod plot;
 mod record;
 mod reference;
+mod scenes;
 mod shrink;
-pub(crate) mod table;
+pub mod stress;
+mod table;
 
 pub use against::{Change, Verdict, against};
 pub use docs::replace_section;

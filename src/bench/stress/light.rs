@@ -7,8 +7,9 @@ use std::sync::Arc;
 use glam::{DMat4, DVec3};
 
 use super::backend::{Backend, StressError};
-use super::scenes::{camera, contact, glowing, matt, named, object, place, scene, square};
+use super::scenes::{contact, glowing, named, square};
 use super::{At, Effort, Measured};
+use crate::bench::scenes::{camera, matt, object, place, scene};
 use crate::scene::shape::sphere;
 use crate::scene::{EncodedPhoto, Environment, EnvironmentMap, Photo, Scene, Side};
 

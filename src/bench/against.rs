@@ -106,7 +106,7 @@ fn pooled_spread<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::record::test_support::report;
+    use crate::bench::record::test_support::report;
 
     /// Multiplies the seconds of every run of a row.
     fn slow(report: &Report, row: usize, factor: f64) -> Report {

@@ -6,9 +6,9 @@
 use glam::DVec3;
 
 use super::Law;
+use crate::bench::scenes::{camera, matt, object, place, scene};
 use crate::scene::shape::{quad, sphere};
 use crate::scene::{Light, LightKind, Primitive, Scene, Side};
-use crate::stress::scenes::{camera, matt, object, place, scene};
 
 /// Of the picture, unless it is what grows.
 const SIZE: [u32; 2] = [320, 256];

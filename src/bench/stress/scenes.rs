@@ -1,116 +1,11 @@
-//! Small scenes made in code, and the same scene at another size and place.
-
-use std::path::PathBuf;
-use std::sync::Arc;
+//! Scenes that are hard, and the same scene at another size and place.
 
 use glam::{DMat4, DVec3};
 
 use super::Effort;
+use crate::bench::scenes::{camera, colored, matt, object, place, scene};
 use crate::scene::shape::{cuboid, quad};
-use crate::scene::{
-    Aperture, BackendChoice, Camera, Composite, Estimator, Exposure, Instance, Lens, Light,
-    LightKind, Material, Object, Primitive, SamplerKind, Scene, Settings, Side, Stages,
-};
-
-/// A scene of these objects, seen by a pinhole, one interaction before the light.
-pub(crate) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -> Scene {
-    Scene {
-        name: "stress".to_owned(),
-        path: PathBuf::new(),
-        inputs: Vec::new(),
-        stages: Stages::default(),
-        photo: None,
-        camera,
-        lens: Lens {
-            aperture_radius_m: 0.0,
-            focus_distance_m: f64::INFINITY,
-            aperture: Aperture::Disc,
-            blade_rotation_deg: 0.0,
-        },
-        environment: None,
-        lights: Vec::new(),
-        shutter: None,
-        camera_path: Default::default(),
-        objects,
-        settings: Settings {
-            rays_per_pixel,
-            max_bounces: 1,
-            clamp_indirect: f32::INFINITY,
-            seed: 1,
-            estimator: Estimator::Direct,
-            sampler: SamplerKind::Sobol,
-            composite: Composite::Additive,
-            backend: BackendChoice::Cpu,
-            exposure: Exposure::Ev(0.0),
-        },
-        warnings: Vec::new(),
-    }
-}
-
-/// `focal_px`: focal length in pixels.
-pub(crate) fn camera(
-    [width, height]: [u32; 2],
-    focal_px: f64,
-    position: DVec3,
-    target: DVec3,
-    up: DVec3,
-) -> Camera {
-    let back = (position - target).normalize();
-    let right = up.cross(back).normalize();
-    let axis = |v: DVec3, w: f64| v.extend(w);
-    Camera {
-        width,
-        height,
-        fx: focal_px,
-        fy: focal_px,
-        cx: f64::from(width) * 0.5,
-        cy: f64::from(height) * 0.5,
-        distortion: [0.0; 5],
-        world_from_camera: DMat4::from_cols(
-            axis(right, 0.0),
-            axis(back.cross(right), 0.0),
-            axis(back, 0.0),
-            axis(position, 1.0),
-        ),
-    }
-}
-
-pub(crate) fn object(
-    side: Side,
-    name: &str,
-    primitive: Primitive,
-    material: Material,
-    world_from_object: DMat4,
-) -> Object {
-    Object {
-        name: name.to_owned(),
-        side,
-        motion: None,
-        world_from_object,
-        instances: vec![Instance {
-            animation: None,
-            object_from_local: DMat4::IDENTITY,
-            primitive: Arc::new(primitive),
-            material: Arc::new(material),
-        }],
-        self_shadow_bias_m: 0.0,
-        albedo_from_photo: false,
-    }
-}
-
-fn colored([r, g, b]: [f32; 3]) -> Material {
-    Material {
-        base_color: [r, g, b, 1.0],
-        ..Material::default()
-    }
-}
-
-pub(crate) fn matt(color: [f32; 3]) -> Material {
-    Material {
-        specular: 0.0,
-        ..colored(color)
-    }
-}
+use crate::scene::{Light, LightKind, Material, Object, Primitive, Scene, Side};
 
 pub(super) fn mirror(color: [f32; 3], roughness: f32) -> Material {
     Material {
@@ -156,11 +51,6 @@ pub(super) fn square(half: f64) -> Primitive {
         DVec3::new(2.0 * half, 0.0, 0.0),
         DVec3::new(0.0, 0.0, -2.0 * half),
     )
-}
-
-/// Turned by this angle about Y, then moved.
-pub(crate) fn place(translation: DVec3, turn_deg: f64) -> DMat4 {
-    DMat4::from_translation(translation) * DMat4::from_rotation_y(turn_deg.to_radians())
 }
 
 pub(super) fn point_light(position: DVec3, intensity: f32) -> Light {
