@@ -13,6 +13,7 @@
 
 mod edges;
 mod flow;
+pub(super) mod gpu;
 mod planes;
 mod simplify;
 

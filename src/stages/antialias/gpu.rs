@@ -2,15 +2,15 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::GpuStages;
 use crate::film::Picture;
 use crate::gpu::GpuError;
 use crate::scene::AntialiasSettings;
+use crate::stages::GpuStages;
 use crate::stages::antialias::is_binary;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct AntialiasParams {
+pub(in crate::stages) struct AntialiasParams {
     width: u32,
     height: u32,
     beta: f32,

@@ -4,6 +4,8 @@
 //! and 10: b = (v + sum of the real ones among the 3 x 3 neighbours) / (1 + their number), and beta b + (1 - beta) v is shown. In linear
 //! light. The twin for the GPU is `shaders/stages_antialias.wgsl`.
 
+pub(super) mod gpu;
+
 use rayon::prelude::*;
 
 use crate::film::Picture;

@@ -2,18 +2,11 @@
 //!
 //! A stage uploads its pictures, runs its kernels once and reads the result back; kernels are compiled at their first use.
 
-mod antialias;
-mod cartoon;
-mod copies;
-mod noise;
-#[cfg(test)]
-mod tests;
-
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::kernel::Kernel;
-use super::{Composer, Features, GpuDevice, GpuError};
+use crate::gpu::kernel::Kernel;
+use crate::gpu::{Composer, Features, GpuDevice, GpuError};
 
 /// Threads of a workgroup along each axis.
 const TILE: u32 = 8;
@@ -75,7 +68,7 @@ impl GpuStages {
     }
 
     /// An array with these contents; never empty, for a binding must not be.
-    fn array(&self, what: &str, contents: &[f32]) -> Result<wgpu::Buffer, GpuError> {
+    pub(super) fn array(&self, what: &str, contents: &[f32]) -> Result<wgpu::Buffer, GpuError> {
         let buffer = self.room(what, contents.len())?;
         self.gpu
             .queue
@@ -84,7 +77,7 @@ impl GpuStages {
     }
 
     /// An array of that many words.
-    fn room(&self, what: &str, words: usize) -> Result<wgpu::Buffer, GpuError> {
+    pub(super) fn room(&self, what: &str, words: usize) -> Result<wgpu::Buffer, GpuError> {
         let bytes = 4 * words.max(4) as u64;
         let allowed = self
             .gpu
@@ -109,7 +102,7 @@ impl GpuStages {
         }))
     }
 
-    fn uniform<T: bytemuck::Pod>(&self, params: &T) -> wgpu::Buffer {
+    pub(super) fn uniform<T: bytemuck::Pod>(&self, params: &T) -> wgpu::Buffer {
         use wgpu::BufferUsages as Usage;
         let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("params"),
@@ -124,7 +117,7 @@ impl GpuStages {
     }
 
     /// One thread for each of `width` x `height`. `buffers` are (group, binding, buffer).
-    fn dispatch(
+    pub(super) fn dispatch(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         entry_point: &'static str,
@@ -145,7 +138,7 @@ impl GpuStages {
     }
 
     /// Runs what was recorded and brings the first `words` of `buffer` back.
-    fn finish(
+    pub(super) fn finish(
         &self,
         mut encoder: wgpu::CommandEncoder,
         buffer: &wgpu::Buffer,
@@ -164,7 +157,7 @@ impl GpuStages {
         Ok(bytemuck::pod_collect_to_vec(&bytes))
     }
 
-    fn encoder(&self) -> wgpu::CommandEncoder {
+    pub(super) fn encoder(&self) -> wgpu::CommandEncoder {
         self.gpu.device.create_command_encoder(&Default::default())
     }
 }

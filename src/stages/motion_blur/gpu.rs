@@ -2,13 +2,13 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::GpuStages;
+use super::Copies;
 use crate::gpu::GpuError;
-use crate::stages::copies::Copies;
+use crate::stages::GpuStages;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct CopiesParams {
+pub(in crate::stages) struct CopiesParams {
     width: u32,
     height: u32,
     count: u32,

@@ -1,8 +1,8 @@
 //! `[cartoon]` and the other tables of camera stages. A stage whose table is absent is off.
 
-use super::NoiseProfile;
-use super::error::Result;
-use super::reader::{Choice, Node, Table};
+use super::noise::profile::NoiseProfile;
+use crate::scene::error::Result;
+use crate::scene::reader::{Choice, Node, Table};
 
 /// The stages that a scene asks for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -264,7 +264,7 @@ impl CartoonSettings {
     pub const MAX_SHRUNK_PX: u32 = 32768;
 }
 
-pub(super) fn read_stages(root: &Table) -> Result<Stages> {
+pub(crate) fn read_stages(root: &Table) -> Result<Stages> {
     for stage in ["noise", "antialias", "motion_blur"] {
         root.refuse_both("cartoon", stage)?;
     }

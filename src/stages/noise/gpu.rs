@@ -2,15 +2,15 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::GpuStages;
 use crate::film::Picture;
 use crate::gpu::GpuError;
 use crate::scene::LAGS;
+use crate::stages::GpuStages;
 use crate::stages::noise::{NoiseInput, NoiseSource, NoiseStage, sigma_table};
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct NoiseParams {
+pub(in crate::stages) struct NoiseParams {
     width: u32,
     height: u32,
     bins: u32,

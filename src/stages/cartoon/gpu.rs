@@ -2,15 +2,15 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::GpuStages;
 use crate::gpu::GpuError;
 use crate::scene::{CartoonSettings, CartoonStyle, FlowSettings};
 use crate::stages::EncodedImage;
+use crate::stages::GpuStages;
 use crate::stages::cartoon::{Cartoon, EdgeResponses, flow_weights};
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct CartoonParams {
+pub(in crate::stages) struct CartoonParams {
     width: u32,
     height: u32,
     small_width: u32,
@@ -27,7 +27,7 @@ pub(super) struct CartoonParams {
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct FlowParams {
+pub(in crate::stages) struct FlowParams {
     tensor_count: u32,
     inner_count: u32,
     outer_count: u32,

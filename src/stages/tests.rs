@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use wgpu::naga;
 
-use super::antialias::AntialiasParams;
-use super::cartoon::{CartoonParams, FlowParams};
-use super::copies::CopiesParams;
-use super::noise::NoiseParams;
-use super::{GpuStages, STAGE_KERNELS};
+use super::antialias::gpu::AntialiasParams;
+use super::cartoon::gpu::{CartoonParams, FlowParams};
+use super::device::{GpuStages, STAGE_KERNELS};
+use super::motion_blur::gpu::CopiesParams;
+use super::noise::gpu::NoiseParams;
 use crate::film::Picture;
 use crate::gpu::harness::test_device;
 use crate::gpu::kernel::reflect_bindings;
@@ -21,7 +21,7 @@ use crate::scene::{
 use crate::stages::EncodedImage;
 use crate::stages::antialias::antialias;
 use crate::stages::cartoon::cartoon;
-use crate::stages::copies::{Copies, draw_copies};
+use crate::stages::motion_blur::{Copies, draw_copies};
 use crate::stages::noise::{NoiseInput, NoiseStage};
 
 const SIZE: (u32, u32) = (101, 67);

@@ -4,9 +4,10 @@ use glam::Vec3;
 
 use super::copies::{Copies, CopyLayer, draw_copies};
 use crate::film::{Film, Picture, background_pixel};
-use crate::gpu::{GpuError, GpuStages};
+use crate::gpu::GpuError;
 use crate::packed::NONE;
 use crate::scene::{Composite, MotionBlurSettings, Photo};
+use crate::stages::GpuStages;
 
 /// How an object moved in the picture since the frame before.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +32,7 @@ pub struct PictureMotion {
 ///
 /// # Errors
 /// As [`GpuStages::draw_copies`].
-pub(super) fn blur_film(
+pub(in crate::stages) fn blur_film(
     picture: &mut Picture,
     film: &Film,
     photo: Option<&Photo>,
