@@ -1,4 +1,4 @@
-// Answers a sample's ray request. Rust twin: src/cpu/trace.rs.
+// Answers a sample's ray request. Rust twin: src/cpu/request.rs.
 
 import package::bindings::{NONE, frame, materials, triangles, FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_MASK, MATERIAL_ALPHA_BLEND};
 import package::math::{dot3, hash_combine, length3, uniform_from_bits};
@@ -156,7 +156,7 @@ fn answer(st: ptr<function, PathState>, thread: u32) {
     (*st).hit_virtual = hit_virtual;
 }
 
-// Where a ray starts in its own world and in the other one: see src/cpu/trace.rs.
+// Where a ray starts in its own world and in the other one: see src/cpu/request.rs.
 fn ray_into(st: ptr<function, PathState>, world: u32, t_max: f32) -> Ray {
     let offset = (*st).offset;
     var shift = -offset * (*st).coincidence_ratio;
