@@ -13,9 +13,9 @@ use super::photo::read_photo;
 use super::reader::Table;
 use super::settings::read_settings;
 use super::shutter::{read_camera_motion, read_shutter};
-use super::stages::read_stages;
 use super::trajectory::Intrinsics;
 use super::{Photo, Scene};
+use crate::stages::settings::read_stages;
 
 const TABLES: &[&str] = &[
     "photo",

@@ -2,14 +2,14 @@
 
 use std::time::Instant;
 
-use super::EncodedImage;
 use super::antialias::antialias;
 use super::cartoon::cartoon;
-use super::film_copies::{PictureMotion, blur_film};
+use super::motion_blur::{PictureMotion, blur_film};
+use super::noise::own_variance::own_variance;
 use super::noise::{NoiseInput, NoiseStage};
-use super::own_variance::own_variance;
+use super::{EncodedImage, GpuStages};
 use crate::film::{Film, Picture, QUOTIENT_EPSILON};
-use crate::gpu::{GpuError, GpuStages};
+use crate::gpu::GpuError;
 use crate::scene::{
     Composite, MotionBlurMethod, MotionBlurSettings, NoiseMethod, NoiseSettings, Scene,
 };

@@ -6,14 +6,17 @@
 pub mod antialias;
 pub mod calibration;
 pub mod cartoon;
-pub mod copies;
 pub mod curve;
+mod device;
 mod encoded;
-mod film_copies;
 mod finish;
+pub mod motion_blur;
 pub mod noise;
-mod own_variance;
+pub(crate) mod settings;
+#[cfg(test)]
+mod tests;
 
+pub use device::GpuStages;
 pub use encoded::EncodedImage;
-pub use film_copies::{ObjectBlur, PictureMotion};
 pub use finish::{Finished, StageSeconds, finish};
+pub use motion_blur::{ObjectBlur, PictureMotion};

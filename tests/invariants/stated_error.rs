@@ -4,7 +4,7 @@ use mixray::film::{Picture, planes};
 use mixray::renderer::{ErrorGoal, Renderer, RendererOptions, SCRAMBLES};
 use mixray::scene::{BackendChoice, Composite, Scene};
 
-use crate::support::*;
+use super::support::*;
 
 const SEEDS: u32 = 16;
 

@@ -16,8 +16,11 @@
 //! rotation for every frame.
 
 mod field;
+pub(super) mod gpu;
 mod kernel;
 mod missing;
+pub(super) mod own_variance;
+pub(crate) mod profile;
 mod textures;
 
 pub use field::{FieldBand, NoiseField, white_deviates};
