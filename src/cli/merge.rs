@@ -6,11 +6,12 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::picture_flags::png_bits;
+use super::progress::Bar;
 use super::render::write;
 use super::{Failure, Outcome, print, say};
 use crate::film::Film;
 use crate::output::{FilmNote, PngBits, Target, check_distinct, read_film};
-use crate::renderer::Renderer;
+use crate::renderer::{Progress, Renderer, Watcher};
 use crate::scene::{self, BackendChoice, Scene};
 
 /// Puts films of sample ranges together
@@ -75,7 +76,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         range.1 = part.note.range.1;
     }
     let total = first.note.total;
-    let renderer = Renderer::with_film(scene, film, range.1, first.note.without)?;
+    let bar = Bar::new("building trees", "rays per pixel");
+    let hear = |progress: &Progress| bar.hear(progress);
+    let renderer = Renderer::with_film(
+        scene,
+        film,
+        range.1,
+        first.note.without,
+        &Watcher::none().heard_by(&hear),
+    )?;
+    drop(bar);
     let complete = range == (0, total);
     write(
         &renderer,

@@ -7,13 +7,14 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::picture_flags::PictureFlags;
-use super::{Failure, Outcome, interrupt, print, progress, say, summary};
+use super::progress::Bar;
+use super::{Failure, Outcome, interrupt, print, say, summary};
 use crate::output::{
     FilmNote, Format, Metadata, PngBits, Target, check_distinct, check_writable, write_exr,
     write_film, write_png, write_text,
 };
 use crate::renderer::{
-    Budget, CameraNoise, ErrorGoal, Renderer, RendererOptions, SCRAMBLES, Stats,
+    Budget, CameraNoise, ErrorGoal, Progress, Renderer, RendererOptions, SCRAMBLES, Stats, Watcher,
 };
 use crate::scene::{self, Choice, MotionBlurMethod, NoiseFit, NoiseProfile, Overrides};
 use crate::stages::{GpuStages, finish};
@@ -131,6 +132,11 @@ impl Arguments {
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     job.flags.start_threads()?;
     let start = Instant::now();
+    let unit = match job.goal {
+        Some(_) => "scrambles",
+        None => "rays per pixel",
+    };
+    let bar = Bar::new("reading the scene", unit);
     let mut scene = scene::load(&job.scene)?;
     scene.settings.apply(&job.overrides);
     let mut goal = job.goal;
@@ -145,9 +151,11 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
             fit: noise.profile.fit,
         });
     }
-    for warning in &scene.warnings {
-        say("warning", warning);
-    }
+    bar.aside(|| {
+        for warning in &scene.warnings {
+            say("warning", warning);
+        }
+    });
     let targets = match job.targets.as_slice() {
         [] => vec![Target::picture(&PathBuf::from(format!(
             "{}.png",
@@ -167,25 +175,20 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         without: job.flags.without(),
         filter: job.filter,
     };
-    let mut renderer = Renderer::new(scene, options)?;
+    let hear = |progress: &Progress| bar.hear(progress);
+    let watcher = Watcher::none().heard_by(&hear);
+    let mut renderer = Renderer::new(scene, options, &watcher)?;
     let without = renderer.without();
-    say_idle(&renderer, goal.as_ref());
+    bar.aside(|| say_idle(&renderer, goal.as_ref()));
     let goal = goal.map(|goal| goal.without(without));
     let interrupted = interrupt::watch()?;
-    let (first, end) = (job.range).unwrap_or((0, renderer.scene().settings.rays_per_pixel));
-    let unit = if goal.is_some() {
-        "scrambles"
-    } else {
-        "rays per pixel"
-    };
-    let bar = progress::Bar::new(end - first, unit);
     let cancelled = || interrupted.is_set();
-    let result = match &goal {
-        Some(goal) => renderer.render_to_error(goal, &cancelled, &mut |p| bar.show(&p)),
-        None => renderer.advance(Budget::Complete, &cancelled, &mut |p| bar.show(&p)),
-    };
-    bar.clear();
-    result?;
+    let watcher = watcher.cancelled_by(&cancelled);
+    match &goal {
+        Some(goal) => renderer.render_to_error(goal, &watcher)?,
+        None => renderer.advance(Budget::Complete, &watcher)?,
+    }
+    drop(bar);
     for note in renderer.notes() {
         say("note", note);
     }
