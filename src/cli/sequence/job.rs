@@ -281,7 +281,7 @@ impl Sequence<'_> {
             motion.as_ref(),
             started.gpu.as_ref(),
         );
-        self.seconds.add_stages(&seconds);
+        self.seconds.stages.add(&seconds);
         self.frames.rendered += 1;
         self.frames.moving += u32::from(renderer.is_moving());
         self.non_finite_samples += renderer.film().non_finite_samples();

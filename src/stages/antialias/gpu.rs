@@ -2,9 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::AntialiasSettings;
 use crate::film::Picture;
 use crate::gpu::GpuError;
-use crate::scene::AntialiasSettings;
 use crate::stages::GpuStages;
 use crate::stages::antialias::is_binary;
 

@@ -2,8 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::{CartoonSettings, CartoonStyle, FlowSettings};
 use crate::gpu::GpuError;
-use crate::scene::{CartoonSettings, CartoonStyle, FlowSettings};
 use crate::stages::EncodedImage;
 use crate::stages::GpuStages;
 use crate::stages::cartoon::{Cartoon, EdgeResponses, flow_weights};

@@ -4,9 +4,9 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::film::Picture;
 use crate::gpu::GpuError;
-use crate::scene::LAGS;
 use crate::stages::GpuStages;
 use crate::stages::noise::{NoiseInput, NoiseSource, NoiseStage, sigma_table};
+use crate::stages::settings::LAGS;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
