@@ -36,3 +36,4 @@ pub mod scene;
 pub mod stages;
 
 pub mod video;
+pub mod work;
