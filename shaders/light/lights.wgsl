@@ -1,8 +1,8 @@
 // Choosing a light and a point on it. Rust twin: src/light/lights.rs.
 
-import package::packed::bindings::{
-    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE, frame, lights,
-};
+import package::gpu::buffers::{frame, lights};
+import package::packed::records::{LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light};
+import package::shared::NONE;
 import package::light::environment::{env_evaluate, env_radiance, env_sample};
 import package::math::{cross3, dot3, length3, safe_sqrt};
 import package::cpu::state::FAR;
