@@ -26,7 +26,7 @@ fn light_select(u: f32, coin: f32) -> u32 {
     let scaled = u * f32(frame.light_count);
     let index = min(u32(scaled), frame.light_count - 1u);
     if coin < lights[index].alias_threshold { return index; }
-    return lights[index].alias_;
+    return lights[index].alias_light;
 }
 
 fn light_sample(index: u32, position: vec3<f32>, u: vec2<f32>) -> LightSample {
