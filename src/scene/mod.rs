@@ -27,14 +27,7 @@ pub mod srgb;
 mod tests;
 pub mod trajectory;
 
-pub use crate::stages::noise::profile::{
-    Autocorrelation, LAGS, MAX_BINS, NOISE_PROFILE_VERSION, NoiseBin, NoiseFit, NoiseProfile,
-    WHITE, bin_index,
-};
-pub use crate::stages::settings::{
-    AntialiasSettings, CartoonSettings, CartoonStyle, FlowSettings, MotionBlurMethod,
-    MotionBlurSettings, NoiseMethod, NoiseSettings, Stages,
-};
+pub use crate::stages::settings::*;
 pub use error::SceneError;
 pub use file::{Given, load, load_with};
 pub use fingerprint::fingerprint_of;

@@ -5,11 +5,35 @@
 //! light. The twin for the GPU is `shaders/stages/antialias.wgsl`.
 
 pub(super) mod gpu;
+pub(super) mod settings;
 
 use rayon::prelude::*;
 
+use super::GpuStages;
+use super::finish::{Shot, Stage};
 use crate::film::Picture;
-use crate::scene::AntialiasSettings;
+use crate::gpu::GpuError;
+pub use settings::AntialiasSettings;
+
+pub(super) const STAGE: Stage = Stage {
+    name: "antialias",
+    wants: |shot| shot.scene.stages.antialias.is_some(),
+    run,
+};
+
+fn run(shot: &mut Shot, gpu: Option<&GpuStages>) -> Result<(), GpuError> {
+    let settings = shot.scene.stages.antialias.unwrap_or_default();
+    let mask = shot.mask().into_owned();
+    let done = match gpu {
+        Some(gpu) => gpu.antialias(&mut shot.picture, &mask, &settings)?,
+        None => antialias(&mut shot.picture, &mask, &settings),
+    };
+    if !done {
+        let note = "[antialias] is off: the film's borders are smooth already";
+        shot.notes.push(note.to_owned());
+    }
+    Ok(())
+}
 
 /// Every value is 0 or 1: borders are hard, and the blend has work to do. A film of many samples has soft borders already.
 pub fn is_binary(mask: &[f32]) -> bool {

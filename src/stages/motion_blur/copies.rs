@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use crate::scene::MotionBlurSettings;
+use super::MotionBlurSettings;
 
 /// An object alone, as large as the picture.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,9 +1,11 @@
 //! Motion blur by copies along the motion in the picture.
 
 mod copies;
-mod film_copies;
 pub(super) mod gpu;
+pub(super) mod settings;
+mod stage;
 
 pub use copies::{Copies, CopyLayer, draw_copies};
-pub(super) use film_copies::blur_film;
-pub use film_copies::{ObjectBlur, PictureMotion};
+pub use settings::{MotionBlurMethod, MotionBlurSettings};
+pub(super) use stage::STAGE;
+pub use stage::{ObjectBlur, PictureMotion};

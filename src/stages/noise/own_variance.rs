@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::film::{Film, Picture, QUOTIENT_EPSILON, variance};
+use crate::film::{Film, Means, Picture, QUOTIENT_EPSILON, variance};
 use crate::scene::{Photo, SamplerKind};
 
 /// Half of the window.
@@ -88,8 +88,9 @@ fn scale_to_quotient(plane: &mut [[f32; 3]], film: &Film, photo: &Photo) {
         if sums.n_real == 0 || sums.m == sums.n {
             continue;
         }
-        let share = 1.0 - sums.m as f32 / sums.n as f32;
-        let real = (sums.r_ir.value() / f64::from(sums.n_real)).as_vec3();
+        let means = Means::of(sums);
+        let share = 1.0 - means.mask as f32;
+        let real = means.r_ir.as_vec3();
         for c in 0..3 {
             let gain = share * ic[c] / real[c].max(QUOTIENT_EPSILON as f32);
             // What virtual surfaces bring is not multiplied.
@@ -135,7 +136,7 @@ fn without_photo(
         for x in wanted(y) {
             let value = &mut row[x];
             let sums = &film.pixels[y * width + x];
-            let share = 1.0 - sums.m as f32 / sums.n.max(1) as f32;
+            let share = 1.0 - Means::of(sums).mask as f32;
             if share == 0.0 {
                 continue;
             }

@@ -1,13 +1,11 @@
 //! The copies of a film's objects: which pixel shows which object, what is behind, and what the copies make of it.
 
-use glam::Vec3;
-
-use super::copies::{Copies, CopyLayer, draw_copies};
-use crate::film::{Film, Picture, background_pixel};
+use super::{Copies, CopyLayer, MotionBlurMethod, draw_copies};
+use crate::film::{Film, Means, background_pixel};
 use crate::gpu::GpuError;
 use crate::packed::NONE;
-use crate::scene::{Composite, MotionBlurSettings, Photo};
 use crate::stages::GpuStages;
+use crate::stages::finish::{Shot, Stage};
 
 /// How an object moved in the picture since the frame before.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,47 +26,39 @@ pub struct PictureMotion {
     pub blurs: Vec<ObjectBlur>,
 }
 
-/// Blurs the picture; returns how much of each pixel is virtual then, or `None` if nothing moved enough and the picture is as it was.
-///
-/// # Errors
-/// As [`GpuStages::draw_copies`].
-pub(in crate::stages) fn blur_film(
-    picture: &mut Picture,
-    film: &Film,
-    photo: Option<&Photo>,
-    composite: Composite,
-    motion: &PictureMotion,
-    settings: &MotionBlurSettings,
-    gpu: Option<&GpuStages>,
-) -> Result<Option<Vec<f32>>, GpuError> {
-    let copies_of = |blur: &ObjectBlur| Copies::of(blur.blur_px, settings);
-    if motion.blurs.iter().all(|blur| copies_of(blur).is_none()) {
-        return Ok(None);
+pub(in crate::stages) const STAGE: Stage = Stage {
+    name: "motion_blur",
+    wants: |shot| {
+        let settings = shot.scene.stages.motion_blur;
+        shot.motion.is_some() && settings.is_some_and(|s| s.method == MotionBlurMethod::Copies)
+    },
+    run,
+};
+
+/// Where nothing moves enough the shot stays as it is.
+fn run(shot: &mut Shot, gpu: Option<&GpuStages>) -> Result<(), GpuError> {
+    let settings = shot.scene.stages.motion_blur.unwrap_or_default();
+    let Some(motion) = shot.motion else {
+        return Ok(());
+    };
+    let copies_of = |blur_px| Copies::of(blur_px, &settings);
+    if (motion.blurs.iter()).all(|blur| copies_of(blur.blur_px).is_none()) {
+        return Ok(());
     }
-    let owners = spread(&motion.objects, film);
-    let mut blurs = motion.blurs.clone();
-    blurs.sort_by(|a, b| b.depth_m.total_cmp(&a.depth_m));
-    // What no known object owns is drawn first, as it is.
-    let still = (NONE, [0.0; 2]);
-    let order = std::iter::once(still).chain(blurs.iter().map(|blur| (blur.object, blur.blur_px)));
-    let layers: Vec<CopyLayer> = order
-        .map(|(object, blur_px)| CopyLayer {
-            pixels: layer_of(film, &owners, object),
-            blur_px,
-        })
-        .filter(|layer| layer.pixels.iter().any(|pixel| pixel[3] > 0.0))
-        .collect();
+    let film = shot.film;
+    let layers = layers(film, motion);
     let drawn: Vec<(&[[f32; 4]], Copies)> = layers
         .iter()
         .map(|layer| {
-            let copies = Copies::of(layer.blur_px, settings).unwrap_or(Copies::ONE);
+            let copies = copies_of(layer.blur_px).unwrap_or(Copies::ONE);
             (layer.pixels.as_slice(), copies)
         })
         .collect();
+    let photo = shot.scene.photo.as_ref();
     let mut canvas: Vec<[f32; 4]> = (film.pixels.iter().enumerate())
         .map(|(pixel, sums)| {
             let ic = photo.map_or([0.0; 3], |photo| photo.linear[pixel]);
-            let [r, g, b] = background_pixel(sums, ic, composite);
+            let [r, g, b] = background_pixel(sums, ic, shot.scene.settings.composite);
             [r, g, b, 0.0]
         })
         .collect();
@@ -81,13 +71,31 @@ pub(in crate::stages) fn blur_film(
             }
         }
     }
-    for (value, [r, g, b, covered]) in picture.linear.iter_mut().zip(&canvas) {
+    for (value, [r, g, b, covered]) in shot.picture.linear.iter_mut().zip(&canvas) {
         // Where no copy reaches, the composite stays to the bit.
         if *covered > 0.0 {
             *value = [*r, *g, *b];
         }
     }
-    Ok(Some(canvas.iter().map(|pixel| pixel[3]).collect()))
+    shot.blurred_mask = Some(canvas.iter().map(|pixel| pixel[3]).collect());
+    Ok(())
+}
+
+/// What is drawn, the farthest first.
+fn layers(film: &Film, motion: &PictureMotion) -> Vec<CopyLayer> {
+    let owners = spread(&motion.objects, film);
+    let mut blurs = motion.blurs.clone();
+    blurs.sort_by(|a, b| b.depth_m.total_cmp(&a.depth_m));
+    // What no known object owns is drawn first, as it is.
+    let still = (NONE, [0.0; 2]);
+    let order = std::iter::once(still).chain(blurs.iter().map(|blur| (blur.object, blur.blur_px)));
+    order
+        .map(|(object, blur_px)| CopyLayer {
+            pixels: layer_of(film, &owners, object),
+            blur_px,
+        })
+        .filter(|layer| layer.pixels.iter().any(|pixel| pixel[3] > 0.0))
+        .collect()
 }
 
 /// Object of each pixel that shows something virtual: where its centre shows none, that of the nearest pixels that do.
@@ -129,9 +137,9 @@ fn layer_of(film: &Film, owners: &[u32], object: u32) -> Vec<[f32; 4]> {
             if sums.m == 0 || *owner != object {
                 return [0.0; 4];
             }
-            let n = f64::from(sums.n);
-            let colour: Vec3 = (sums.m_im.value() / n).as_vec3();
-            colour.extend((f64::from(sums.m) / n) as f32).to_array()
+            let means = Means::of(sums);
+            let colour = means.m_im.as_vec3();
+            colour.extend(means.mask as f32).to_array()
         })
         .collect()
 }
