@@ -17,6 +17,7 @@
 mod avx2;
 mod binary;
 mod compressed;
+mod kernel;
 mod large_pages;
 mod spheres;
 mod stack;
@@ -36,7 +37,7 @@ use thiserror::Error;
 
 use crate::packed::NONE;
 use compressed::CompressedBvh;
-use trace::Kernel;
+use kernel::Kernel;
 use wide::WideBvh;
 
 /// Largest absolute coordinate, metres, for which no product in the triangle test overflows.
@@ -188,12 +189,12 @@ impl WorldBvh {
 
     #[inline]
     fn closest_by(&self, kernel: Kernel, ray: &Ray) -> Hit {
-        trace::closest(&self.wide, kernel, ray)
+        kernel::closest(&self.wide, kernel, ray)
     }
 
     #[inline]
     fn any_by(&self, kernel: Kernel, ray: &Ray) -> bool {
-        trace::any(&self.wide, kernel, ray)
+        kernel::any(&self.wide, kernel, ray)
     }
 
     /// Smallest and largest vertex coordinates; `None` without triangles.

@@ -1,50 +1,13 @@
 //! Traversal of the CPU's tree and the triangle test. Twin of `shaders/accel/trace.wgsl`: the triangle test there does the same f32 operations.
 
+use super::Ray;
 use super::wide::{Eight, TriangleBlock, WideBvh, WideNode};
-use super::{Hit, Ray};
 
 /// Factor by which a box may be farther than a hit: 16 units of rounding (see the module's proof).
 pub(super) const BOX_MARGIN: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 
 /// Slack of the projected bounds test, relative to the largest projected coordinate: four units of rounding, doubled.
 pub(super) const PROJECTED_SLACK: f32 = 1.0 / (1 << 21) as f32;
-
-/// Which instructions the traversal uses; the results are the same.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Kernel {
-    Portable,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-impl Kernel {
-    /// All there are, the slowest first.
-    const ALL: &[Kernel] = &[
-        Kernel::Portable,
-        #[cfg(target_arch = "x86_64")]
-        Kernel::Avx2,
-        #[cfg(target_arch = "x86_64")]
-        Kernel::Avx512,
-    ];
-
-    /// Those that this processor can run, the slowest first.
-    pub(super) fn supported() -> impl DoubleEndedIterator<Item = Kernel> {
-        Kernel::ALL.iter().copied().filter(|kernel| match kernel {
-            Kernel::Portable => true,
-            #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2 => super::avx2::has_avx2(),
-            #[cfg(target_arch = "x86_64")]
-            Kernel::Avx512 => super::avx2::has_avx512(),
-        })
-    }
-
-    /// The fastest that this processor can run.
-    pub(super) fn best() -> Kernel {
-        Kernel::supported().next_back().unwrap_or(Kernel::Portable)
-    }
-}
 
 /// What the portable traversal needs to know of a ray.
 struct RayFrame {
@@ -239,34 +202,10 @@ macro_rules! traversal {
 }
 pub(super) use traversal;
 
+/// Nearest or any accepted hit, without special instructions.
 #[inline(always)]
-fn traverse<const ANY: bool>(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> Found {
-    match kernel {
-        Kernel::Portable => portable::<ANY>(tree, ray),
-        #[cfg(target_arch = "x86_64")]
-        Kernel::Avx2 => super::avx2::traverse::<ANY>(tree, ray),
-        #[cfg(target_arch = "x86_64")]
-        Kernel::Avx512 => super::avx2::traverse_avx512::<ANY>(tree, ray),
-    }
-}
-
-#[inline(always)]
-pub(super) fn closest(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> Hit {
-    let found = traverse::<false>(tree, kernel, ray);
-    if !found.any {
-        return Hit::MISS;
-    }
-    Hit {
-        t: found.t,
-        u: found.weights[0],
-        v: found.weights[1],
-        triangle: found.id,
-    }
-}
-
-#[inline(always)]
-pub(super) fn any(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> bool {
-    traverse::<true>(tree, kernel, ray).any
+pub(super) fn traverse<const ANY: bool>(tree: &WideBvh, ray: &Ray) -> Found {
+    portable::<ANY>(tree, ray)
 }
 
 /// One triangle seen along the ray.

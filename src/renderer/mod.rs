@@ -80,7 +80,7 @@ pub struct RendererOptions {
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
     #[error(transparent)]
-    Pack(#[from] crate::packed::PackError),
+    Pack(#[from] crate::pack::PackError),
     #[error(transparent)]
     Gpu(#[from] crate::gpu::GpuError),
     #[error(transparent)]
@@ -317,7 +317,7 @@ impl Renderer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::packed::test_scene;
+    use crate::pack::test_scene;
     use crate::scene::{BackendChoice, Light, LightKind, Side};
 
     #[test]

@@ -16,6 +16,7 @@ mod material;
 mod object;
 mod photo;
 mod pose;
+pub mod projection;
 pub(crate) mod reader;
 mod scan;
 mod settings;

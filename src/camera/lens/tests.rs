@@ -2,8 +2,12 @@
 
 use super::super::chi_squared::{assert_uniform, critical, statistic};
 use super::*;
+use crate::distortion;
 use crate::math::{hash_u32, uniform_from_bits};
-use glam::DMat4;
+use crate::pack::camera::frame_camera;
+use crate::scene::projection::{check_distortion, project, undistort};
+use crate::scene::{Aperture, Camera, Lens};
+use glam::{DMat4, DVec3};
 
 fn camera(distortion: [f64; 5]) -> Camera {
     let rotation = DMat4::from_rotation_y(0.7) * DMat4::from_rotation_x(-0.3);

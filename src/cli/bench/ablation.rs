@@ -3,7 +3,7 @@
 use super::rows::{Arguments, Job};
 use crate::bench::{Aim, Goal, Method, Truth, rmse_of};
 use crate::cli::{Failure, progress, say};
-use crate::packed::instants;
+use crate::pack::instants;
 use crate::renderer::{CameraNoise, Skip};
 use crate::scene::{BackendChoice, Choice, Estimator, NoiseFit, Scene};
 

@@ -9,9 +9,11 @@ use glam::DVec3;
 
 use super::Arguments;
 use super::plan::{Files, known_rate, views};
-use crate::camera::lens::{camera_project, frame_camera, project};
+use crate::camera::lens::camera_project;
 use crate::cli::{Failure, Outcome, print};
+use crate::pack::camera::frame_camera;
 use crate::packed::Frame;
+use crate::scene::projection::project;
 use crate::scene::trajectory::{EntryKey, FrameName, KnownPoint, Trajectory};
 use crate::scene::{Camera, Lens};
 use crate::video::FrameSource;

@@ -13,7 +13,7 @@ use crate::cli::progress::Steps;
 use crate::cli::render::say_idle;
 use crate::cli::{Failure, Outcome, interrupt, print, say};
 use crate::output::{check_writable, write_text};
-use crate::packed::next_anchor;
+use crate::pack::next_anchor;
 use crate::renderer::{
     Budget, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
 };
