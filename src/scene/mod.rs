@@ -10,7 +10,6 @@ mod error;
 mod file;
 mod fingerprint;
 pub mod gltf;
-mod image_file;
 mod light;
 mod material;
 mod noise_profile;
