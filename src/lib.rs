@@ -23,6 +23,7 @@ pub mod accel;
 pub mod bench;
 pub mod camera;
 pub mod cli;
+mod clock;
 pub mod cpu;
 mod decode;
 pub mod film;

@@ -14,6 +14,7 @@ mod merge;
 mod motion_blur;
 mod noise;
 mod picture_flags;
+mod pool;
 mod progress;
 mod render;
 mod sequence;
@@ -70,6 +71,10 @@ impl<E: std::error::Error> From<E> for Failure {
 
 /// Parses the process's arguments and runs the command.
 pub fn run() -> ExitCode {
+    pool::on_large_stack(run_command)
+}
+
+fn run_command() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Sequence(arguments) => sequence::run(&arguments),

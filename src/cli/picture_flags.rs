@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use super::Failure;
 use super::render::choice;
+use super::{Failure, pool};
 use crate::output::PngBits;
 use crate::renderer::{Skip, Without};
 use crate::scene::{BackendChoice, Composite, Estimator, Overrides, SamplerKind, Settings};
@@ -74,12 +74,7 @@ impl PictureFlags {
 
 /// That many for the CPU's work, if a number is given; once.
 pub(super) fn start_threads(threads: Option<u16>) -> Result<(), Failure> {
-    if let Some(threads) = threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(threads))
-            .build_global()?;
-    }
-    Ok(())
+    pool::start(threads)
 }
 
 pub(super) fn png_bits(name: String) -> PngBits {

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::pool;
 use crate::renderer::Progress;
 
 /// What a render counts: "rays per pixel" or "scrambles".
@@ -18,7 +19,7 @@ impl Bar {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(u64::from(total));
             set_template(&bar, &format!("{{wide_bar}} {{pos}}/{{len}} {unit}"));
-            bar.enable_steady_tick(Duration::from_millis(200));
+            tick(&bar, 200);
             bar
         });
         Self { bar, unit }
@@ -56,7 +57,7 @@ impl Steps {
         }
         let bar = ProgressBar::new(count);
         set_template(&bar, "{bar:24} {pos}/{len}, {elapsed}: {wide_msg}");
-        bar.enable_steady_tick(Duration::from_millis(500));
+        tick(&bar, 500);
         Self(Some(bar))
     }
 
@@ -78,6 +79,13 @@ impl Steps {
         if let Some(bar) = &self.0 {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// Moves on its own, where a thread can be made for that.
+fn tick(bar: &ProgressBar, milliseconds: u64) {
+    if pool::can_spawn() {
+        bar.enable_steady_tick(Duration::from_millis(milliseconds));
     }
 }
 

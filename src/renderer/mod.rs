@@ -22,6 +22,7 @@ mod control;
 mod edits;
 mod goal;
 mod motion;
+mod needs;
 mod photo_albedo;
 mod picture_motion;
 mod series;
@@ -71,6 +72,8 @@ pub struct RendererOptions {
 
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
+    #[error(transparent)]
+    Memory(#[from] crate::memory::Shortage),
     #[error(transparent)]
     Pack(#[from] crate::packed::PackError),
     #[error(transparent)]
@@ -149,7 +152,9 @@ impl Renderer {
         if first_sample >= end_sample || end_sample > total {
             return Err(RenderError::SampleRange(first_sample, end_sample, total));
         }
+        needs::ensure_scene(&scene, options.all_planes)?;
         let packed = PackedScene::build(&scene)?;
+        needs::ensure_film(&packed, options.all_planes)?;
         let time_secs = scene.shutter.map_or(0.0, |shutter| shutter.time_secs);
         let film = Film::new(
             packed.frame.width,
@@ -279,7 +284,7 @@ impl Renderer {
         }
         let watch = Watch::start();
         let deadline = match budget {
-            Budget::Time(time) => Some(watch.begin + time),
+            Budget::Time(time) => watch.begin.checked_add(time),
             Budget::Complete | Budget::Rays(_) => None,
         };
         let first = self.film.first_sample;

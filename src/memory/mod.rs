@@ -3,6 +3,10 @@
 //! On Linux the least of what the machine has left, what the control groups of this process leave it, and its limits of address space
 //! and data; elsewhere a plain limit. Numbers that cannot be read limit nothing.
 
+mod allocator;
+
+pub use allocator::EndWhenShort;
+
 use std::fmt;
 
 /// Less than this is not worth a look at the system's numbers.
@@ -29,22 +33,42 @@ pub struct Shortage {
 /// # Errors
 /// They cannot.
 pub fn ensure(bytes: u64, what: &str) -> Result<(), Shortage> {
-    if bytes <= SMALL_BYTES {
-        return Ok(());
-    }
-    compare(bytes, what, system::least_free())
+    ensure_lazy(bytes, bytes, what)
 }
 
-fn compare(needed: u64, what: &str, (free, limit): (u64, &'static str)) -> Result<(), Shortage> {
-    if needed <= free {
+/// That `mapped` bytes more can be taken for `what`, of which no more than `touched` are ever written.
+///
+/// # Errors
+/// They cannot.
+pub fn ensure_lazy(mapped: u64, touched: u64, what: &str) -> Result<(), Shortage> {
+    if mapped.max(touched) <= SMALL_BYTES {
         return Ok(());
     }
-    Err(Shortage {
-        what: what.to_owned(),
-        needed,
-        free,
-        limit,
-    })
+    compare(mapped, touched, what, &system::limits())
+}
+
+/// What is left under one limit.
+struct Free {
+    bytes: u64,
+    limit: &'static str,
+    /// Pages that were never written count too.
+    of_addresses: bool,
+}
+
+fn compare(mapped: u64, touched: u64, what: &str, limits: &[Free]) -> Result<(), Shortage> {
+    let short = limits.iter().filter_map(|free| {
+        let needed = if free.of_addresses { mapped } else { touched };
+        (needed > free.bytes).then_some((needed, free))
+    });
+    match short.min_by_key(|(_, free)| free.bytes) {
+        None => Ok(()),
+        Some((needed, free)) => Err(Shortage {
+            what: what.to_owned(),
+            needed,
+            free: free.bytes,
+            limit: free.limit,
+        }),
+    }
 }
 
 /// A number of bytes for people: "12.9 GB".
@@ -63,9 +87,15 @@ impl fmt::Display for Bytes {
 
 #[cfg(not(target_os = "linux"))]
 mod system {
+    use super::Free;
+
     /// Without numbers of the system: what a machine of today has.
-    pub fn least_free() -> (u64, &'static str) {
-        (64 << 30, "the limit of this program on this system")
+    pub fn limits() -> Vec<Free> {
+        vec![Free {
+            bytes: 64 << 30,
+            limit: "the limit of this program on this system",
+            of_addresses: false,
+        }]
     }
 }
 
@@ -74,22 +104,42 @@ mod system {
     use std::fs::read_to_string;
     use std::path::Path;
 
-    pub fn least_free() -> (u64, &'static str) {
+    use super::Free;
+
+    pub fn limits() -> Vec<Free> {
         let memory = read_to_string("/proc/meminfo").unwrap_or_default();
         let limits = read_to_string("/proc/self/limits").unwrap_or_default();
         let status = read_to_string("/proc/self/status").unwrap_or_default();
         let groups = read_to_string("/proc/self/cgroup").unwrap_or_default();
-        let free = [
-            free_of_machine(&memory).map(|bytes| (bytes, "of this machine's memory")),
-            free_of_limit(&limits, "Max address space", &status, "VmSize:")
-                .map(|bytes| (bytes, "of the limit of address space, ulimit -v")),
-            free_of_limit(&limits, "Max data size", &status, "VmData:")
-                .map(|bytes| (bytes, "of the limit of data, ulimit -d")),
-            free_of_groups(&groups, Path::new("/sys/fs/cgroup"))
-                .map(|bytes| (bytes, "of the control group's memory")),
-        ];
-        let least = free.into_iter().flatten().min_by_key(|(bytes, _)| *bytes);
-        least.unwrap_or((u64::MAX, "without a limit"))
+        let free = |bytes: Option<u64>, limit, of_addresses| {
+            bytes.map(|bytes| Free {
+                bytes,
+                limit,
+                of_addresses,
+            })
+        };
+        let left = |name, used| free_of_limit(&limits, name, &status, used);
+        [
+            free(free_of_machine(&memory), "of this machine's memory", false),
+            free(
+                free_of_groups(&groups, Path::new("/sys/fs/cgroup")),
+                "of the control group's memory",
+                false,
+            ),
+            free(
+                left("Max address space", "VmSize:"),
+                "of the limit of address space, ulimit -v",
+                true,
+            ),
+            free(
+                left("Max data size", "VmData:"),
+                "of the limit of data, ulimit -d",
+                true,
+            ),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
     }
 
     /// "VmSize:   123 kB" as bytes.
@@ -159,13 +209,21 @@ mod tests {
 
     #[test]
     fn a_shortage_says_both_figures_and_what_sets_the_limit() {
-        let free = (5_300_000_000, "of the limit of address space, ulimit -v");
-        let error = compare(28_800_000_000, "a film of 20000 x 10000 pixels", free).unwrap_err();
+        let free = |bytes, of_addresses| Free {
+            bytes,
+            limit: "of the limit of address space, ulimit -v",
+            of_addresses,
+        };
+        let limits = [free(5_300_000_000, true), free(1_000_000_000, false)];
+        let what = "a film of 20000 x 10000 pixels";
+        let error = compare(28_800_000_000, 999_999_999, what, &limits).unwrap_err();
         assert_eq!(
             error.to_string(),
             "a film of 20000 x 10000 pixels needs 28.8 GB of memory; 5.3 GB are free (of the limit of address space, ulimit -v); use something smaller or more memory"
         );
-        assert_eq!(compare(5_300_000_000, "a film", free), Ok(()), "control");
+        let fits = compare(5_300_000_000, 1_000_000_000, what, &limits);
+        assert_eq!(fits, Ok(()), "control");
+        assert!(compare(1_000_000_001, 1_000_000_001, what, &limits).is_err());
     }
 
     #[test]
