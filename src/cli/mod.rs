@@ -20,6 +20,8 @@ mod render;
 mod sequence;
 mod stage_device;
 mod summary;
+mod threads;
+mod values;
 
 use std::io::Write;
 use std::path::Path;
@@ -78,14 +80,14 @@ fn run_command() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Sequence(arguments) => sequence::run(&arguments),
-        Command::Merge(arguments) => merge::run(&arguments),
-        Command::Bench(arguments) => arguments.check().and_then(bench::run),
-        Command::Cartoon(arguments) => cartoon::run(&arguments),
-        Command::Noise(arguments) => noise::run(&arguments),
-        Command::Antialias(arguments) => antialias::run(&arguments),
-        Command::MotionBlur(arguments) => motion_blur::run(&arguments),
-        Command::Compare(arguments) => compare::run(&arguments),
-        Command::Info(arguments) => info::run(&arguments),
+        Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
+        Command::Bench(arguments) => bench::run(arguments),
+        Command::Cartoon(arguments) => all_threads().and_then(|()| cartoon::run(&arguments)),
+        Command::Noise(arguments) => all_threads().and_then(|()| noise::run(&arguments)),
+        Command::Antialias(arguments) => all_threads().and_then(|()| antialias::run(&arguments)),
+        Command::MotionBlur(arguments) => all_threads().and_then(|()| motion_blur::run(&arguments)),
+        Command::Compare(arguments) => all_threads().and_then(|()| compare::run(&arguments)),
+        Command::Info(arguments) => all_threads().and_then(|()| info::run(&arguments)),
     };
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
@@ -96,6 +98,11 @@ fn run_command() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// For commands without a flag for it.
+fn all_threads() -> Result<(), Failure> {
+    pool::start(None)
 }
 
 /// Reads an image of any program, warnings said.
