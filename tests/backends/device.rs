@@ -7,10 +7,9 @@ use mixray::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError, harness::test_
 use mixray::renderer::{Budget, Cancel, Pass, RayTotals, Renderer};
 use mixray::scene::BackendChoice;
 
-use super::agreement::{
-    Difference, backend_for, complete, cpu_film, gpu_film, load, planes, renderer,
-};
+use super::agreement::{Difference, backend_for, cpu_film, gpu_film, load, planes, renderer};
 use super::scenes::{RAYS, case};
+use crate::support::complete;
 
 /// The same samples in other portions.
 fn in_portions(backend: &mut GpuBackend, renderer: &Renderer, ends: &[u32]) -> (Film, RayTotals) {

@@ -3,11 +3,11 @@
 use mixray::renderer::Skip;
 use mixray::scene::Choice;
 
-use super::support::{Folder, QUICK};
+use super::support::{QUICK, folder};
 
 #[test]
 fn each_saving_has_its_rows() {
-    let folder = Folder::new();
+    let folder = folder();
     let shown = folder.succeed(&format!("{QUICK} --ablate --goal-rpp 64"));
     let report = folder.json("out/results.json");
     let rows = report["rows"].as_array().unwrap();
@@ -54,7 +54,7 @@ fn each_saving_has_its_rows() {
 
 #[test]
 fn savings_and_goals_have_rows_by_name() {
-    let folder = Folder::new();
+    let folder = folder();
     folder.succeed(&format!(
         "{QUICK} --estimators direct --no-skip cones --no-skip cones --target-error 0.5 --camera-noise 0.5,20 --goal-rpp 16"
     ));
@@ -81,7 +81,7 @@ fn savings_and_goals_have_rows_by_name() {
 
 #[test]
 fn flags_that_would_do_nothing_are_refused() {
-    let folder = Folder::new();
+    let folder = folder();
     for flag in [
         "--ablate",
         "--no-skip cones",
