@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use mixray::bench::stress::{fan_of_slivers, placed};
 use mixray::scene::{BackendChoice, Environment, EnvironmentMap, Primitive, Scene};
-use mixray::stress::{fan_of_slivers, placed};
 
 use super::support::*;
 

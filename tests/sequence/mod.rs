@@ -5,5 +5,6 @@ mod blur;
 mod copies;
 mod errors;
 mod frames;
+mod ranges;
 mod resume;
 mod support;
