@@ -19,6 +19,8 @@ mod render;
 mod sequence;
 mod stage_device;
 mod summary;
+mod threads;
+mod values;
 
 use std::io::Write;
 use std::path::Path;
@@ -74,7 +76,7 @@ pub fn run() -> ExitCode {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Sequence(arguments) => sequence::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
-        Command::Bench(arguments) => arguments.check().and_then(bench::run),
+        Command::Bench(arguments) => bench::run(arguments),
         Command::Cartoon(arguments) => cartoon::run(&arguments),
         Command::Noise(arguments) => noise::run(&arguments),
         Command::Antialias(arguments) => antialias::run(&arguments),

@@ -117,18 +117,18 @@ impl Lanes {
         })
     }
 
-    /// The buffer of a binding of group 1; `parity` says which queue is read.
-    pub fn get(&self, binding: u32, parity: usize) -> Option<&wgpu::Buffer> {
-        Some(match binding {
-            0 => &self.batch,
-            1 => &self.work,
-            2 => &self.paths,
-            3 => &self.queues[parity],
-            4 => &self.queues[1 - parity],
-            5 => &self.counters,
-            6 => &self.indirect,
-            7 => &self.pixel_sums,
-            8 => &self.guide_sums,
+    /// The buffer of that name in `shaders/gpu/lanes.wgsl`; `parity` says which queue is read.
+    pub fn get(&self, name: &str, parity: usize) -> Option<&wgpu::Buffer> {
+        Some(match name {
+            "batch" => &self.batch,
+            "work" => &self.work,
+            "paths" => &self.paths,
+            "queue_in" => &self.queues[parity],
+            "queue_out" => &self.queues[1 - parity],
+            "counters" => &self.counters,
+            "indirect" => &self.indirect,
+            "pixel_sums" => &self.pixel_sums,
+            "guide_sums" => &self.guide_sums,
             _ => return None,
         })
     }

@@ -52,7 +52,7 @@ pub enum GpuError {
 }
 
 #[cfg(test)]
-mod layout_test;
+pub(crate) mod layout_test;
 #[cfg(test)]
 mod variants_test;
 #[cfg(test)]

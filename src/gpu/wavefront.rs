@@ -93,7 +93,7 @@ fn path_bytes(kernels: &[Kernel]) -> u64 {
     kernels[ADVANCE]
         .bindings()
         .iter()
-        .find(|binding| (binding.group, binding.binding) == (1, 2))
+        .find(|binding| binding.name == "paths")
         .map_or(16, |binding| u64::from(binding.stride))
 }
 
@@ -326,9 +326,8 @@ impl GpuBackend {
 
     fn bind(&mut self, lanes: &Lanes) -> Result<(), GpuError> {
         let bind = |kernel: &Kernel, parity: usize| {
-            kernel.bind(&self.gpu, |group, binding| match group {
-                0 => self.scene.get(binding),
-                _ => lanes.get(binding, parity),
+            kernel.bind(&self.gpu, |name| {
+                lanes.get(name, parity).or_else(|| self.scene.get(name))
             })
         };
         self.groups = self

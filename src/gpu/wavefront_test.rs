@@ -24,7 +24,7 @@ struct PathState {
 
 /// A walk that ends at each step with probability 1/8; what it 'hits' is a hash of where it is.
 const ESTIMATOR: &str = "
-import package::packed::bindings::frame;
+import package::gpu::buffers::frame;
 import package::cpu::state::{PathState, STAGE_DONE};
 import package::toy::mix_bits;
 fn begin_sample(pixel: u32, index: u32, real_pass: bool) -> PathState {

@@ -107,10 +107,8 @@ impl GpuStages {
         (width, height): (u32, u32),
     ) -> Result<(), GpuError> {
         let kernel = self.kernel(kernel)?;
-        let groups = kernel.bind(&self.gpu, |group, binding| {
-            let mut bindings = kernel.bindings().iter();
-            let bound = bindings.find(|b| (b.group, b.binding) == (group, binding))?;
-            let named = buffers.iter().find(|(name, _)| *name == bound.name);
+        let groups = kernel.bind(&self.gpu, |name| {
+            let named = buffers.iter().find(|(given, _)| *given == name);
             named.map(|(_, buffer)| *buffer)
         })?;
         let mut pass = encoder.begin_compute_pass(&Default::default());
