@@ -23,6 +23,7 @@ pub mod accel;
 pub mod camera;
 pub mod cli;
 pub mod cpu;
+pub mod files;
 pub mod film;
 pub mod gpu;
 pub mod light;

@@ -7,7 +7,7 @@ use clap::Args;
 use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
 use super::{Failure, Outcome, print, say};
-use crate::output::{Target, check_distinct, write_composite};
+use crate::output::{Target, write_composite};
 use crate::scene::AntialiasSettings;
 use crate::stages::antialias::antialias;
 
@@ -37,7 +37,6 @@ fn unit(text: &str) -> Result<f32, &'static str> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let target = Target::picture(&arguments.output)?;
-    check_distinct(&[&arguments.output], &arguments.layers.paths())?;
     let mut layers = arguments.layers.read()?;
     let settings = AntialiasSettings {
         beta: arguments.beta,

@@ -28,6 +28,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::files;
 use crate::scene::Photo;
 
 /// Renders virtual objects into photographs as the same camera would have taken them.
@@ -72,7 +73,9 @@ impl<E: std::error::Error> From<E> for Failure {
 
 /// Parses the process's arguments and runs the command.
 pub fn run() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let arguments = Arguments::parse();
+    files::guard_run();
+    let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Sequence(arguments) => sequence::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
@@ -89,6 +92,8 @@ pub fn run() -> ExitCode {
         Ok(Outcome::CheckFailed) => ExitCode::from(1),
         Ok(Outcome::Interrupted) => ExitCode::from(130),
         Err(Failure(message)) => {
+            // What met a conflict of files may have wrapped it in its own words.
+            let message = files::conflict().map_or(message, |conflict| conflict.to_string());
             say("error", &message);
             ExitCode::from(2)
         }

@@ -7,7 +7,7 @@ use clap::Args;
 use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
 use super::{Failure, Outcome, print, say};
-use crate::output::{Target, check_distinct, write_composite};
+use crate::output::{Target, write_composite};
 use crate::scene::MotionBlurSettings;
 use crate::stages::copies::{Copies, draw_copies};
 
@@ -63,7 +63,6 @@ fn unit(text: &str) -> Result<f32, &'static str> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let target = Target::picture(&arguments.output)?;
-    check_distinct(&[&arguments.output], &arguments.layers.paths())?;
     let mut layers = arguments.layers.read()?;
     let settings = MotionBlurSettings {
         min_length_px: arguments.min_length,

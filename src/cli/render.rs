@@ -10,8 +10,8 @@ use super::picture_flags::PictureFlags;
 use super::{Failure, Outcome, interrupt, print, progress, say, summary};
 use crate::gpu::GpuStages;
 use crate::output::{
-    FilmNote, Format, Metadata, PngBits, Target, check_distinct, check_writable, write_exr,
-    write_film, write_png, write_text,
+    FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr, write_film, write_png,
+    write_text,
 };
 use crate::renderer::{
     Budget, CameraNoise, ErrorGoal, Renderer, RendererOptions, SCRAMBLES, Stats,
@@ -156,10 +156,6 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         )))?],
         given => given.to_vec(),
     };
-    let outputs: Vec<&Path> = (targets.iter().map(Target::path))
-        .chain(job.flags.stats.as_deref())
-        .collect();
-    check_distinct(&outputs, &scene.inputs)?;
     let load_secs = start.elapsed().as_secs_f64();
 
     let options = RendererOptions {

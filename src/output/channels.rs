@@ -19,12 +19,14 @@ impl ChannelFile {
     /// Why it cannot be read, in one line that begins with the path.
     pub fn read(path: &Path) -> Result<Self, String> {
         let problem = |reason: &str| format!("{}: {reason}", path.display());
+        let unreadable = |error: &dyn std::fmt::Display| {
+            problem(&format!(
+                "cannot be read as OpenEXR ({error}); expected an .exr file that is whole; correct the path or write the file again"
+            ))
+        };
+        crate::files::input(path).map_err(|error| unreadable(&error))?;
         let image = exr::prelude::read_first_flat_layer_from_file(path)
-            .map_err(|error| {
-                problem(&format!(
-                    "cannot be read as OpenEXR ({error}); expected an .exr file that is whole; correct the path or write the file again"
-                ))
-            })?;
+            .map_err(|error| unreadable(&error))?;
         let layer = image.layer_data;
         let mut file = Self {
             width: layer.size.x() as u32,

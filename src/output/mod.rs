@@ -15,8 +15,8 @@ pub use plain::{write_composite, write_image};
 pub(crate) use png_file::picture_codes8;
 pub use png_file::{PngBits, write_png};
 pub use reference_file::write_reference;
+pub(crate) use target::check_writable;
 pub use target::{Format, Target, write_bytes, write_text};
-pub(crate) use target::{check_distinct, check_writable};
 
 use std::path::PathBuf;
 
@@ -27,10 +27,8 @@ pub enum OutputError {
     Extension { path: PathBuf },
     #[error("{}: is a folder or another special file; name a file to write", path.display())]
     NotAFile { path: PathBuf },
-    #[error("{}: is read here and would be overwritten; give the output another name", path.display())]
-    Input { path: PathBuf },
-    #[error("{}: named for two outputs; give each a name of its own", path.display())]
-    Twice { path: PathBuf },
+    #[error(transparent)]
+    Conflict(#[from] crate::files::Conflict),
     #[error("{}: cannot be written: {source}", path.display())]
     Io {
         path: PathBuf,

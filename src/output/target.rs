@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::OutputError;
+use crate::files;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
@@ -20,10 +21,10 @@ pub struct Target {
 }
 
 impl Target {
-    /// Checks the extension and that a file can be made in the folder.
+    /// Checks the extension and that a file can be made in the folder, and names it as an output of the run.
     ///
     /// # Errors
-    /// Another extension, a missing or read-only folder, or a target that is no regular file.
+    /// Another extension, a missing or read-only folder, a target that is no regular file, an input or another output.
     pub fn picture(path: &Path) -> Result<Self, OutputError> {
         let extension = path.extension().map(|e| e.to_ascii_lowercase());
         let format = match extension.as_ref().and_then(|e| e.to_str()) {
@@ -40,6 +41,14 @@ impl Target {
         })
     }
 
+    /// A picture file that is checked and named already.
+    pub(crate) fn named(path: &Path, format: Format) -> Self {
+        Self {
+            path: path.into(),
+            format,
+        }
+    }
+
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -49,38 +58,10 @@ impl Target {
     }
 }
 
-/// Fails now if [`write_atomically`] would fail later.
+/// Names the output, and fails now if [`write_atomically`] would fail later.
 pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
+    files::output(path)?;
     temporary_beside(path).map(|_| ())
-}
-
-/// Fails if an output would replace one of `inputs` or another output.
-pub(crate) fn check_distinct(outputs: &[&Path], inputs: &[PathBuf]) -> Result<(), OutputError> {
-    let inputs: Vec<PathBuf> = inputs.iter().map(|path| resolved(path)).collect();
-    let mut seen = Vec::new();
-    for path in outputs {
-        let resolved = resolved(path);
-        if inputs.contains(&resolved) {
-            return Err(OutputError::Input { path: path.into() });
-        }
-        if seen.contains(&resolved) {
-            return Err(OutputError::Twice { path: path.into() });
-        }
-        seen.push(resolved);
-    }
-    Ok(())
-}
-
-/// One path for each file however it is named, for files that do not exist yet too.
-fn resolved(path: &Path) -> PathBuf {
-    let of_folder = || {
-        let absolute = std::path::absolute(path).ok()?;
-        let folder = absolute.parent()?.canonicalize().ok()?;
-        Some(folder.join(absolute.file_name()?))
-    };
-    (path.canonicalize().ok())
-        .or_else(of_folder)
-        .unwrap_or_else(|| path.into())
 }
 
 /// Replaces the file at `path` by `text`.
@@ -107,6 +88,7 @@ pub(super) fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&File>) -> Result<(), OutputError>,
 ) -> Result<(), OutputError> {
+    files::before_write(path)?;
     let (temporary, target) = temporary_beside(path)?;
     let mut writer = BufWriter::new(temporary.as_file());
     write(&mut writer)?;
@@ -132,7 +114,7 @@ fn temporary_beside(path: &Path) -> Result<(tempfile::NamedTempFile, PathBuf), O
             return Err(OutputError::NotAFile { path: path.into() });
         }
         Ok(_) => path.canonicalize().map_err(|e| io_error(path, e))?,
-        Err(e) if e.kind() == io::ErrorKind::NotFound => path.to_path_buf(),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => files::final_target(path),
         Err(e) => return Err(io_error(path, e)),
     };
     let folder = match target.parent() {
@@ -225,5 +207,9 @@ mod tests {
         write_text(&link, "new").unwrap();
         assert!(link.symlink_metadata().unwrap().is_symlink());
         assert_eq!(std::fs::read_to_string(&real).unwrap(), "new");
+        std::fs::remove_file(&real).unwrap();
+        write_text(&link, "made").unwrap();
+        assert!(link.symlink_metadata().unwrap().is_symlink());
+        assert_eq!(std::fs::read_to_string(&real).unwrap(), "made");
     }
 }

@@ -32,7 +32,7 @@ pub(super) enum Pixels {
 
 /// Reads an image. An error reads "problem; expected ...; how to mend" and leaves out the path.
 pub(super) fn read_image(path: &Path) -> Result<ImageFile, String> {
-    let bytes = std::fs::read(path).map_err(|error| {
+    let bytes = crate::files::read(path).map_err(|error| {
         format!(
             "it cannot be read ({error}); expected an image file; correct the path or the rights"
         )

@@ -100,7 +100,7 @@ impl NoiseProfile {
 
     /// Reads a profile file. An error reads "problem; expected ...; how to mend" and leaves out the path.
     pub fn read(path: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(path).map_err(|error| {
+        let text = crate::files::read_to_string(path).map_err(|error| {
             format!("it cannot be read ({error}); expected a noise profile; correct the path")
         })?;
         Self::from_toml(&text)

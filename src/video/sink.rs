@@ -10,8 +10,12 @@ use std::path::{Path, PathBuf};
 use super::y4m::Header;
 use super::yuv::encode_yuv;
 use super::{Pixels, Place, VideoError, VideoFrame};
+use crate::files::{self, final_target};
 use crate::film::Picture;
-use crate::output::{PngBits, Target, picture_codes8, write_bytes, write_png, write_text};
+use crate::output::{
+    Format, OutputError, PngBits, Target, check_writable, picture_codes8, write_bytes, write_png,
+    write_text,
+};
 use crate::scene::trajectory::FrameName;
 use crate::scene::{EncodedPhoto, Photo};
 
@@ -29,6 +33,8 @@ pub struct SinkPlan<'a> {
     pub png_bits: Option<PngBits>,
     /// Frames of another render are replaced.
     pub overwrite: bool,
+    /// The frames to come, where they are known.
+    pub names: Vec<FrameName>,
 }
 
 pub struct FrameSink {
@@ -54,7 +60,7 @@ enum Kind {
 
 impl FrameSink {
     /// # Errors
-    /// It cannot be written, or holds frames of another render.
+    /// It cannot be written, holds frames of another render, or files that are read.
     pub fn open(plan: SinkPlan<'_>) -> Result<Self, VideoError> {
         let kind = if plan.path == Path::new("-") {
             let mut out = BufWriter::new(std::io::stdout());
@@ -65,8 +71,7 @@ impl FrameSink {
         } else if plan.path.extension().is_some_and(|e| e == "y4m") {
             open_y4m(&plan)?
         } else {
-            open_folder(&plan)?;
-            Kind::Folder(plan.path.into())
+            Kind::Folder(open_folder(&plan)?)
         };
         Ok(Self {
             kind,
@@ -76,10 +81,17 @@ impl FrameSink {
         })
     }
 
-    /// The frame, the next in order, is finished from an earlier run. Asked once for each.
-    pub fn has(&mut self, name: &FrameName) -> bool {
-        match &self.kind {
-            Kind::Folder(folder) => png_path(folder, name).is_file(),
+    /// The frame, the next in order, is finished from an earlier run. Asked once for each, before it is written.
+    ///
+    /// # Errors
+    /// Its file is one that is read, or that of another frame.
+    pub fn has(&mut self, name: &FrameName) -> Result<bool, VideoError> {
+        Ok(match &self.kind {
+            Kind::Folder(folder) => {
+                let path = png_path(folder, name);
+                check_writable(&path)?;
+                path.is_file()
+            }
             Kind::Y4mFile { there, .. } => {
                 let has = self.written < *there;
                 self.written += u32::from(has);
@@ -87,7 +99,7 @@ impl FrameSink {
             }
             Kind::Whole => true,
             Kind::Stdout(_) => false,
-        }
+        })
     }
 
     /// Writes a frame whose photograph is `frame`'s.
@@ -101,7 +113,7 @@ impl FrameSink {
         frame: &VideoFrame,
     ) -> Result<(), VideoError> {
         if let Kind::Folder(folder) = &self.kind {
-            let target = Target::picture(&png_path(folder, name))?;
+            let target = Target::named(&png_path(folder, name), Format::Png);
             let photo = Some(&frame.photo);
             let bits = self.png_bits.unwrap_or_else(|| PngBits::for_photo(photo));
             return Ok(write_png(&target, picture, photo, bits)?);
@@ -207,41 +219,55 @@ fn foreign(path: &Path) -> VideoError {
     )
 }
 
-fn open_folder(plan: &SinkPlan<'_>) -> Result<(), VideoError> {
-    let folder = plan.path;
-    let place = Place::File(folder.into());
-    std::fs::create_dir_all(folder).map_err(|error| {
+/// The folder, links resolved.
+fn open_folder(plan: &SinkPlan<'_>) -> Result<PathBuf, VideoError> {
+    let folder = final_target(plan.path);
+    let place = Place::File(plan.path.into());
+    files::output(plan.path).map_err(OutputError::from)?;
+    for name in &plan.names {
+        files::check_output(&png_path(&folder, name)).map_err(OutputError::from)?;
+    }
+    std::fs::create_dir_all(&folder).map_err(|error| {
         place.error(format!("it cannot be made ({error}); expected a folder for the frames, a file that ends in .y4m, or -; name another"))
     })?;
     let note_path = folder.join(NOTE);
+    check_writable(&note_path)?;
     let note = format!("{{\n  \"fingerprint\": \"{}\"\n}}\n", plan.fingerprint);
     if std::fs::read_to_string(&note_path).is_ok_and(|text| text == note) {
-        return Ok(());
+        return Ok(folder);
     }
-    let entries = std::fs::read_dir(folder).map_err(|error| place.error(cannot_write(&error)))?;
-    for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
-        if path.extension().is_some_and(|e| e == "png") {
-            if !plan.overwrite {
-                return Err(foreign(folder));
-            }
-            std::fs::remove_file(&path)
-                .map_err(|error| Place::File(path).error(cannot_write(&error)))?;
-        }
+    let entries = std::fs::read_dir(&folder).map_err(|error| place.error(cannot_write(&error)))?;
+    let others: Vec<PathBuf> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|e| e == "png"))
+        .collect();
+    if !others.is_empty() && !plan.overwrite {
+        return Err(foreign(plan.path));
     }
-    Ok(write_text(&note_path, &note)?)
+    for path in &others {
+        files::before_write(path).map_err(OutputError::from)?;
+    }
+    for path in others {
+        std::fs::remove_file(&path)
+            .map_err(|error| Place::File(path).error(cannot_write(&error)))?;
+    }
+    write_text(&note_path, &note)?;
+    Ok(folder)
 }
 
 /// The fingerprint stands in the header, where other programs pass it by.
 fn open_y4m(plan: &SinkPlan<'_>) -> Result<Kind, VideoError> {
     let line = format!("{} XMIXRAY={}", plan.header.line, plan.fingerprint);
-    let path = plan.path.to_path_buf();
+    let path = final_target(plan.path);
+    let part = path.with_extension("y4m.part");
+    check_writable(plan.path)?;
+    check_writable(&part)?;
     if path.exists() && !plan.overwrite {
         return match first_line(&path).is_some_and(|first| first == line) {
             true => Ok(Kind::Whole),
             false => Err(foreign(&path)),
         };
     }
-    let part = path.with_extension("y4m.part");
     let failed = |error: std::io::Error| Place::File(part.clone()).error(cannot_write(&error));
     if part.exists() && !plan.overwrite && first_line(&part).is_none_or(|first| first != line) {
         return Err(foreign(&part));

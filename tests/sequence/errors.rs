@@ -40,7 +40,7 @@ fn poses_and_frames_that_do_not_fit_are_refused() {
         "no frame of the range",
     );
     folder.save("in/f_0002.png", 48, 36, 2);
-    folder.refused(&["--frames", "in", "-o", "in"], "would be replaced");
+    folder.refused(&["--frames", "in", "-o", "in"], "would be overwritten");
     folder.refused(&["--frames", "none", "-o", "out"], "none");
     folder.refused(&["-o", "out"], "--frames is absent");
     folder.save("in/g_0002.png", 48, 36, 2);

@@ -21,7 +21,20 @@ pub(super) struct Gallery {
 pub(super) fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
     let arguments = &job.arguments;
     let scenes = load_scenes(arguments, job.hardware_gpu())?;
-    job.make_folder()?;
+    let plots = scenes.iter().flat_map(|scene| {
+        let name = |axis, format| format!("{}-error-{axis}.{format}", scene.name);
+        [
+            ("time", "svg"),
+            ("time", "png"),
+            ("rays", "svg"),
+            ("rays", "png"),
+        ]
+        .map(|(axis, format)| name(axis, format))
+    });
+    let plots: Vec<String> = plots.collect();
+    let mut names = vec!["results.json", "results.csv", "index.html"];
+    names.extend(plots.iter().map(String::as_str));
+    job.make_folder(&names)?;
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
     let steps = progress::Steps::new(scenes.iter().map(|scene| job.runs_of(scene)).sum());

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::benchmark::Gallery;
 use crate::cli::{Failure, say};
+use crate::files;
 use crate::output::{write_bytes, write_text};
 use crate::report::{Axis, FORMAT, Plot, Report, csv, page, plots};
 
@@ -40,7 +41,7 @@ pub(super) fn write_pictures(
 }
 
 pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|error| Failure(format!("{}: {error}", path.display())))
+    files::read_to_string(path).map_err(|error| Failure(format!("{}: {error}", path.display())))
 }
 
 pub(super) fn read_report(path: &Path) -> Result<Report, Failure> {

@@ -8,7 +8,7 @@ use crate::report::{FORMAT, gpu_time, gpu_time_markdown, gpu_time_text};
 pub(super) fn gpu_times(job: &Job) -> Result<Outcome, Failure> {
     let interrupted = interrupt::watch()?;
     let scenes = load_scenes(&job.arguments, false)?;
-    job.make_folder()?;
+    job.make_folder(&["gpu-time.json"])?;
     let steps = progress::Steps::new((scenes.len() * job.arguments.rpp.len()) as u64);
     let mut times = Vec::new();
     'scenes: for scene in &scenes {

@@ -222,7 +222,10 @@ impl Arguments {
 
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     if job.arguments.stress || job.arguments.growth.is_some() {
-        job.make_folder()?;
+        job.make_folder(match job.arguments.stress {
+            true => &["stress.json", "stress.csv", "stress.md"],
+            false => &["growth.json", "growth.csv"],
+        })?;
         let (folder, command) = (&job.arguments.output, command_line());
         let (outcome, table) = match &job.arguments.growth {
             Some(laws) => {
@@ -288,9 +291,13 @@ impl Job {
         }
     }
 
-    /// Makes the folder for what is written, once it is known that something will be.
-    fn make_folder(&self) -> Result<(), Failure> {
+    /// Makes the folder for what is written, once it is known that something will be; `names` are the files that are.
+    fn make_folder(&self, names: &[&str]) -> Result<(), Failure> {
         let folder = &self.arguments.output;
+        crate::files::output(folder)?;
+        for name in names {
+            crate::files::output(&folder.join(name))?;
+        }
         std::fs::create_dir_all(folder).map_err(|error| {
             Failure(format!(
                 "{}: {error}; expected a folder that can be made; give another with -o",

@@ -10,7 +10,7 @@ use crate::report::{
 use crate::scene;
 
 pub(super) fn paper_table(job: &Job) -> Result<Outcome, Failure> {
-    job.make_folder()?;
+    job.make_folder(&["paper.json", "paper.png"])?;
     let folder = &job.arguments.output;
     let path = folder.join("paper.toml");
     write_text(&path, PAPER_SCENE)?;

@@ -183,7 +183,7 @@ fn frame_of(key: &EntryKey, trajectory: &Trajectory) -> FrameName {
 fn read_points(path: &Path) -> Result<Vec<KnownPoint>, Failure> {
     let failure =
         |line: usize, problem: String| Failure(format!("{}:{line}: {problem}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|error| {
+    let text = crate::files::read_to_string(path).map_err(|error| {
         Failure(format!(
             "{}: it cannot be read ({error}); expected a table of points; correct the path",
             path.display()

@@ -36,7 +36,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
                 .to_owned(),
         )
     })?;
-    refuse_same_place(frames, output)?;
     if let Some(path) = &arguments.flags.stats {
         check_writable(path)?;
     }
@@ -44,13 +43,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let rate = known_rate(arguments, &files.trajectory, Some(&source));
     let views = views(&files.trajectory, rate, source.is_stream())?;
     check_frames(arguments, &source, &views)?;
-    let count = source.names().map(|names| {
+    let names: Option<Vec<FrameName>> = source.names().map(|names| {
         names
-            .iter()
+            .into_iter()
             .filter(|name| in_range(arguments, name))
-            .count()
+            .collect()
     });
-    if let (Some((from, to)), None) = (arguments.focus_pull, &count)
+    if let (Some((from, to)), None) = (arguments.focus_pull, &names)
         && arguments.range.is_none()
     {
         return Err(Failure(format!(
@@ -58,13 +57,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         )));
     }
     let interrupted = interrupt::watch()?;
-    let bar = Steps::new(count.unwrap_or(0) as u64);
+    let names = names.unwrap_or_default();
+    let bar = Steps::new(names.len() as u64);
     let mut sequence = Sequence {
         arguments,
         files: &files,
         views: &views,
         rate,
         span: span(arguments, &source),
+        names,
         output,
         started: None,
         frames: Frames::default(),
@@ -106,20 +107,6 @@ fn span(arguments: &Arguments, source: &FrameSource) -> Option<(u32, u32)> {
     Some((names.first()?.number, names.last()?.number))
 }
 
-fn refuse_same_place(frames: &Path, output: &Path) -> Result<(), Failure> {
-    let same = match (frames.canonicalize(), output.canonicalize()) {
-        (Ok(frames), Ok(output)) => frames == output,
-        _ => false,
-    };
-    if !same {
-        return Ok(());
-    }
-    Err(Failure(format!(
-        "{}: the frames would be replaced; expected another place for the output; give another -o",
-        output.display()
-    )))
-}
-
 struct Sequence<'a> {
     arguments: &'a Arguments,
     files: &'a Files,
@@ -127,6 +114,8 @@ struct Sequence<'a> {
     /// Frames a second, where known.
     rate: Option<f64>,
     span: Option<(u32, u32)>,
+    /// The frames to come, where they are known.
+    names: Vec<FrameName>,
     output: &'a Path,
     started: Option<Started>,
     frames: Frames,
@@ -181,7 +170,7 @@ impl Sequence<'_> {
             // The same for every frame whichever run renders it.
             started.anchor = Some(next_anchor(started.anchor, position));
         }
-        let there = started.sink.has(name);
+        let there = started.sink.has(name)?;
         let Some(world_from_camera) = view.world_from_camera else {
             if there {
                 self.frames.kept += 1;
@@ -339,6 +328,7 @@ impl Sequence<'_> {
             header: header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate)),
             png_bits: arguments.flags.png_bits,
             overwrite: arguments.overwrite,
+            names: self.names.clone(),
         })?;
         Ok(Started {
             sink,

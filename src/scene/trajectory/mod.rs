@@ -188,7 +188,7 @@ impl Trajectory {
 }
 
 fn read_text(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|error| {
+    let bytes = crate::files::read(path).map_err(|error| {
         file_error(
             path,
             format!("it cannot be read ({error}); expected a file of poses; correct the path"),
