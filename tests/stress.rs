@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
+use mixray::bench::stress::{Backend, Effort, cases};
 use mixray::gpu::harness::test_device;
-use mixray::stress::{Backend, Effort, cases};
 
 /// All that is wrong, so that one run shows it whole.
 fn failures(backend: &mut Backend) -> Vec<String> {

@@ -7,7 +7,6 @@ mod antialias;
 mod bench;
 mod cartoon;
 mod compare;
-mod growth;
 mod info;
 mod interrupt;
 mod layers;
@@ -19,7 +18,6 @@ mod progress;
 mod render;
 mod sequence;
 mod stage_device;
-mod stress;
 mod summary;
 
 use std::io::Write;

@@ -9,7 +9,7 @@ use super::stage_device::StageDevice;
 use super::{Failure, Outcome, print, say};
 use crate::output::{Target, write_composite};
 use crate::scene::MotionBlurSettings;
-use crate::stages::copies::{Copies, draw_copies};
+use crate::stages::motion_blur::{Copies, draw_copies};
 
 /// Puts a layer over a photograph, blurred along its motion by copies (Fischer and Bartz 2006, section 5)
 #[derive(Debug, Args)]

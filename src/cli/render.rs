@@ -8,7 +8,6 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::picture_flags::PictureFlags;
 use super::{Failure, Outcome, interrupt, print, progress, say, summary};
-use crate::gpu::GpuStages;
 use crate::output::{
     FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr, write_film, write_png,
     write_text,
@@ -17,7 +16,7 @@ use crate::renderer::{
     Budget, CameraNoise, ErrorGoal, Renderer, RendererOptions, SCRAMBLES, Stats,
 };
 use crate::scene::{self, Choice, MotionBlurMethod, NoiseFit, NoiseProfile, Overrides};
-use crate::stages::finish;
+use crate::stages::{GpuStages, finish};
 
 /// Renders a scene's virtual objects into its photograph
 ///

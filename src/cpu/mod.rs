@@ -4,9 +4,10 @@ pub mod contribution;
 pub mod estimator;
 pub mod pilot;
 pub mod render;
+pub mod request;
 pub mod state;
 mod surfaces;
-pub mod trace;
+
 pub mod vertex;
 
 pub use pilot::pilot;

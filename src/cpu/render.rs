@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use super::contribution::ESTIMATOR_PAPER;
 use super::estimator::{advance, begin_sample, samples_without_turn};
+use super::request::answer;
 use super::state::{PathState, RayCounts, STAGE_DONE};
-use super::trace::answer;
 use crate::film::{Film, Guide, GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
 use crate::packed::{PIXEL_EDGE, PIXEL_OUT_OF_REACH, PackedScene};
 use crate::renderer::{Cancel, Pass, RayTotals};

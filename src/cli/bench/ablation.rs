@@ -1,10 +1,10 @@
 //! Rows that tell what a saving is worth: `direct` with it and without it, and what is rendered to a goal instead of a number of rays.
 
 use super::{Arguments, Job};
+use crate::bench::{Aim, Goal, Method, Truth, rmse_of};
 use crate::cli::{Failure, progress, say};
 use crate::packed::instants;
 use crate::renderer::{CameraNoise, Skip};
-use crate::report::{Aim, Goal, Method, Truth, rmse_of};
 use crate::scene::{BackendChoice, Choice, Estimator, NoiseFit, Scene};
 
 /// sigma^2 = A y + B of a camera at a low gain, 8-bit codes, where nobody tells of another.

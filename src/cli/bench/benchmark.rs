@@ -6,8 +6,8 @@ use super::Job;
 use super::conclusions::conclude;
 use super::files::{write_figures, write_pictures};
 use super::load_scenes;
+use crate::bench::{Method, ReferenceGoal, Report, Shot, Source, Truth, measure, reference};
 use crate::cli::{Failure, interrupt, progress, say};
-use crate::report::{Method, ReferenceGoal, Report, Shot, Source, Truth, measure, reference};
 use crate::scene::{Choice, Composite};
 
 /// All that a scene's pictures are shown with.

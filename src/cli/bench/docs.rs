@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::bench::replace_section;
 use crate::cli::Failure;
 use crate::files;
 use crate::output::write_text;
-use crate::report::replace_section;
 
 /// A page with a section for this table.
 pub(super) struct Docs {

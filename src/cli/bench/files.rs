@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::benchmark::Gallery;
+use crate::bench::{Axis, FORMAT, Plot, Report, csv, page, plots};
 use crate::cli::{Failure, say};
 use crate::files;
 use crate::output::{write_bytes, write_text};
-use crate::report::{Axis, FORMAT, Plot, Report, csv, page, plots};
 
 pub(super) fn write_figures(report: &Report, folder: &Path) -> Result<(), Failure> {
     let mut json = serde_json::to_string_pretty(report)?;

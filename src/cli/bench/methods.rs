@@ -2,7 +2,7 @@
 
 use super::Arguments;
 use super::ablation::without_each;
-use crate::report::Method;
+use crate::bench::Method;
 use crate::scene::{BackendChoice, Estimator, SamplerKind};
 
 impl Arguments {

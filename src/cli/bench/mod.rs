@@ -6,9 +6,11 @@ mod conclusions;
 mod docs;
 mod files;
 mod gpu_times;
+mod growth;
 mod methods;
 mod paper;
 mod regression;
+mod stress;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -17,9 +19,9 @@ use clap::Args;
 
 use super::picture_flags::start_threads;
 use super::render::{above_zero, camera_noise, choice};
-use super::{Failure, Outcome, growth, print, say, stress};
+use super::{Failure, Outcome, print, say};
+use crate::bench::{FORMAT, Law, Machine, Method, Plan, Report, markdown, shrink, text};
 use crate::renderer::{CameraNoise, SCRAMBLES, Skip};
-use crate::report::{FORMAT, Law, Machine, Method, Plan, Report, markdown, shrink, text};
 use crate::scene::{self, BackendChoice, Composite, Estimator, SamplerKind, Scene, Settings};
 
 use benchmark::benchmark;

@@ -1,12 +1,12 @@
 //! `--paper-table`.
 
 use super::{Job, command_line};
-use crate::cli::{Failure, Outcome, interrupt, print, progress};
-use crate::output::{write_bytes, write_text};
-use crate::report::{
+use crate::bench::{
     FORMAT, PAPER_SCENE, PaperRow, measure, paper_markdown, paper_rays_per_pixel, paper_rows,
     paper_text, picture_png, shrink,
 };
+use crate::cli::{Failure, Outcome, interrupt, print, progress};
+use crate::output::{write_bytes, write_text};
 use crate::scene;
 
 pub(super) fn paper_table(job: &Job) -> Result<Outcome, Failure> {

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::blocks::Blocks;
 use crate::cpu::estimator::{advance, begin_sample};
+use crate::cpu::request::answer;
 use crate::cpu::state::{PathState, RayCounts, STAGE_DONE};
-use crate::cpu::trace::answer;
 use crate::film::is_unusable;
 use crate::math::{hash_combine, hash_u32};
 use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene};

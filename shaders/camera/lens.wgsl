@@ -1,0 +1,139 @@
+// Twin of the f32 half of src/camera/lens.rs: the same operations in the same order.
+
+import package::packed::bindings::frame;
+import package::math::{dot3, normalize3, sincos_2pi};
+import package::camera::shutter::{CameraPose, camera_pose};
+
+const APERTURE_DISC: u32 = 0u;
+const APERTURE_SQUARE: u32 = 1u;
+const UNDISTORT_STEPS: u32 = 8u;
+const INV_TAU: f32 = 0.15915494;
+
+struct CameraRay {
+    origin: vec3<f32>,
+    direction: vec3<f32>,
+}
+
+struct Projection {
+    px: f32,
+    py: f32,
+    depth: f32,
+    valid: bool,
+}
+
+fn sample_lens(u: f32, v: f32) -> vec2<f32> {
+    let radius = frame.aperture_radius;
+    let a = 2.0 * u - 1.0;
+    let b = 2.0 * v - 1.0;
+    if frame.aperture_shape == APERTURE_DISC {
+        if a == 0.0 && b == 0.0 {
+            return vec2<f32>(0.0, 0.0);
+        }
+        var r = b;
+        var turns = 0.0;
+        if abs(a) > abs(b) {
+            r = a;
+            turns = 0.125 * (b / a);
+        } else {
+            turns = 0.25 - 0.125 * (a / b);
+        }
+        let around = sincos_2pi(turns);
+        return vec2<f32>(radius * r * around.cos, radius * r * around.sin);
+    }
+    let rotation = frame.blade_rotation * INV_TAU;
+    if frame.aperture_shape == APERTURE_SQUARE {
+        let turned = sincos_2pi(rotation);
+        return vec2<f32>(
+            radius * (a * turned.cos - b * turned.sin),
+            radius * (a * turned.sin + b * turned.cos),
+        );
+    }
+    let blades = f32(frame.aperture_shape);
+    let blade = min(floor(u * blades), blades - 1.0);
+    let along = sqrt(max(u * blades - blade, 0.0)) * radius;
+    let half = sincos_2pi(0.5 / blades);
+    let x = along * half.cos;
+    let y = along * half.sin * b;
+    let turned = sincos_2pi((blade + 0.5) / blades + rotation);
+    return vec2<f32>(x * turned.cos - y * turned.sin, x * turned.sin + y * turned.cos);
+}
+
+fn camera_ray(px: f32, py: f32, lens_u: f32, lens_v: f32) -> CameraRay {
+    return camera_ray_from(camera_pose(), px, py, lens_u, lens_v);
+}
+
+fn camera_ray_from(pose: CameraPose, px: f32, py: f32, lens_u: f32, lens_v: f32) -> CameraRay {
+    let ideal = lens_undistort(
+        (px - frame.intrinsics.z) / frame.intrinsics.x,
+        (py - frame.intrinsics.w) / frame.intrinsics.y,
+    );
+    let d = pose.right * ideal.x - (pose.up * ideal.y + pose.back);
+    @if(lens) {
+        if frame.aperture_radius != 0.0 {
+            let at = sample_lens(lens_u, lens_v);
+            let offset = pose.right * at.x + pose.up * at.y;
+            return CameraRay(pose.position + offset, normalize3(d - offset * frame.inv_focus_distance));
+        }
+    }
+    return CameraRay(pose.position, normalize3(d));
+}
+
+fn camera_project(position: vec3<f32>) -> Projection {
+    let v = position - frame.camera_position.xyz;
+    let depth = -dot3(v, frame.camera_back.xyz);
+    if depth <= 0.0 {
+        return Projection(0.0, 0.0, depth, false);
+    }
+    let x = dot3(v, frame.camera_right.xyz) / depth;
+    let y = -dot3(v, frame.camera_up.xyz) / depth;
+    let distorted = lens_distort(x, y);
+    let px = distorted.x * frame.intrinsics.x + frame.intrinsics.z;
+    let py = distorted.y * frame.intrinsics.y + frame.intrinsics.w;
+    let inside = px >= 0.0 && py >= 0.0 && px < f32(frame.width) && py < f32(frame.height);
+    let back = lens_undistort(distorted.x, distorted.y);
+    let miss = abs(back.x - x) + abs(back.y - y);
+    return Projection(px, py, depth, inside && miss <= 1e-3 * (1.0 + abs(x) + abs(y)));
+}
+
+fn lens_distort(x: f32, y: f32) -> vec2<f32> {
+    let k1 = frame.distortion.x;
+    let k2 = frame.distortion.y;
+    let p1 = frame.distortion.z;
+    let p2 = frame.distortion.w;
+    let k3 = frame.distortion_k3;
+    let r2 = x * x + y * y;
+    let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    return vec2<f32>(
+        x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+        y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+    );
+}
+
+fn lens_undistort(xd: f32, yd: f32) -> vec2<f32> {
+    let k1 = frame.distortion.x;
+    let k2 = frame.distortion.y;
+    let p1 = frame.distortion.z;
+    let p2 = frame.distortion.w;
+    let k3 = frame.distortion_k3;
+    if k1 == 0.0 && k2 == 0.0 && p1 == 0.0 && p2 == 0.0 && k3 == 0.0 {
+        return vec2<f32>(xd, yd);
+    }
+    var x = xd;
+    var y = yd;
+    for (var i = 0u; i < UNDISTORT_STEPS; i++) {
+        let at = lens_distort(x, y);
+        let ex = at.x - xd;
+        let ey = at.y - yd;
+        let r2 = x * x + y * y;
+        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
+        let jxx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x;
+        let jxy = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
+        let jyy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
+        let determinant = jxx * jyy - jxy * jxy;
+        let inverse = 1.0 / max(determinant, 1e-4);
+        x -= clamp((jyy * ex - jxy * ey) * inverse, -0.5, 0.5);
+        y -= clamp((jxx * ey - jxy * ex) * inverse, -0.5, 0.5);
+    }
+    return vec2<f32>(x, y);
+}

@@ -1,0 +1,116 @@
+// The cones in which the virtual geometry's bounding spheres are seen from a point. Rust twin: src/light/cones.rs.
+
+import package::packed::bindings::frame;
+import package::math::{cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
+
+const PI: f32 = 3.14159265358979;
+const WIDE_SIN2: f32 = 0.5;
+const CONE_PADDING: f32 = 1e-5;
+const CONE_PADDING_SIN2: f32 = 1e-9;
+const SPHERE_PADDING: f32 = 1e-3;
+const SPHERE_PADDING_DISTANCE2: f32 = 2e-10;
+const COSINE_PADDING: f32 = 1e-6;
+
+struct Cone {
+    axis: vec3<f32>,
+    sin2: f32,
+    one_minus_cos: f32,
+    wide: bool,
+    weight: f32,
+}
+
+fn cone_of(i: u32, position: vec3<f32>, ns: vec3<f32>) -> Cone {
+    let sphere = frame.spheres[i];
+    let to_centre = sphere.xyz - position;
+    let distance_squared = dot3(to_centre, to_centre);
+    let radius_squared = sphere.w * sphere.w;
+    if radius_squared >= distance_squared * WIDE_SIN2 {
+        return Cone(ns, 1.0, 1.0, true, 1.0);
+    }
+    let axis = to_centre / safe_sqrt(distance_squared);
+    let sin2 = radius_squared / distance_squared;
+    let cos = safe_sqrt(1.0 - sin2);
+    let one_minus_cos = sin2 / (1.0 + cos);
+    let cos_axis = clamp(dot3(axis, ns), -1.0, 1.0);
+    var largest = 1.0;
+    if cos_axis < cos {
+        largest = cos_axis * cos + safe_sqrt(1.0 - cos_axis * cos_axis) * safe_sqrt(sin2);
+    }
+    return Cone(axis, sin2, one_minus_cos, false, max(2.0 * one_minus_cos * (largest + COSINE_PADDING), 0.0));
+}
+
+struct ConeSample {
+    direction: vec3<f32>,
+    pdf: f32,
+}
+
+fn cone_sample(position: vec3<f32>, ns: vec3<f32>, choice: f32, u: vec2<f32>) -> ConeSample {
+    var total = 0.0;
+    for (var i = 0u; i < frame.sphere_count; i++) {
+        total += cone_of(i, position, ns).weight;
+    }
+    if total <= 0.0 { return ConeSample(ns, 0.0); }
+    var left = choice * total;
+    var chosen = cone_of(0u, position, ns);
+    for (var i = 0u; i < frame.sphere_count; i++) {
+        let cone = cone_of(i, position, ns);
+        if cone.weight <= 0.0 { continue; }
+        left -= cone.weight;
+        chosen = cone;
+        if left < 0.0 { break; }
+    }
+    var cos = safe_sqrt(1.0 - u.x);
+    var sin = safe_sqrt(u.x);
+    if !chosen.wide {
+        let drop = u.x * chosen.one_minus_cos;
+        cos = 1.0 - drop;
+        sin = safe_sqrt(drop * (2.0 - drop));
+    }
+    let phi = sincos_2pi(u.y);
+    let basis = orthonormal_basis(chosen.axis);
+    let direction = basis.t * (sin * phi.cos) + basis.b * (sin * phi.sin) + chosen.axis * cos;
+    return ConeSample(direction, cone_pdf(position, ns, direction));
+}
+
+fn cone_pdf(position: vec3<f32>, ns: vec3<f32>, direction: vec3<f32>) -> f32 {
+    var total = 0.0;
+    var sum = 0.0;
+    for (var i = 0u; i < frame.sphere_count; i++) {
+        let cone = cone_of(i, position, ns);
+        total += cone.weight;
+        if cone.wide {
+            sum += cone.weight * max(dot3(direction, ns), 0.0) * (1.0 / PI);
+        } else if inside(cone, direction) {
+            sum += cone.weight / (2.0 * PI * cone.one_minus_cos);
+        }
+    }
+    if total > 0.0 { return sum / total; }
+    return 0.0;
+}
+
+fn inside(cone: Cone, direction: vec3<f32>) -> bool {
+    let across = cross3(direction, cone.axis);
+    return dot3(direction, cone.axis) > 0.0 && dot3(across, across) <= cone.sin2 * (1.0 + CONE_PADDING) + CONE_PADDING_SIN2;
+}
+
+fn cone_solid_angle_fraction(position: vec3<f32>, ns: vec3<f32>) -> f32 {
+    var total = 0.0;
+    for (var i = 0u; i < frame.sphere_count; i++) {
+        total += cone_of(i, position, ns).weight;
+    }
+    return min(total, 1.0);
+}
+
+fn direction_meets_spheres(position: vec3<f32>, direction: vec3<f32>) -> bool {
+    for (var i = 0u; i < frame.sphere_count; i++) {
+        let sphere = frame.spheres[i];
+        let to_centre = sphere.xyz - position;
+        let distance_squared = dot3(to_centre, to_centre);
+        let radius_squared = sphere.w * sphere.w * (1.0 + SPHERE_PADDING)
+            + distance_squared * SPHERE_PADDING_DISTANCE2;
+        if distance_squared <= radius_squared { return true; }
+        let across = cross3(direction, to_centre);
+        if dot3(direction, to_centre) > 0.0 && dot3(across, across) <= radius_squared { return true; }
+    }
+    return false;
+}
