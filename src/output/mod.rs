@@ -2,6 +2,7 @@
 
 mod channels;
 mod exr_file;
+mod exr_header;
 mod film_file;
 mod plain;
 mod png_file;
