@@ -19,8 +19,8 @@ mod render;
 mod sequence;
 mod stage_device;
 mod summary;
+mod terminal;
 
-use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -28,6 +28,7 @@ use clap::{Parser, Subcommand};
 
 use crate::files;
 use crate::scene::Photo;
+use terminal::{print, say};
 
 /// Renders virtual objects into photographs as the same camera would have taken them.
 #[derive(Debug, Parser)]
@@ -71,7 +72,8 @@ impl<E: std::error::Error> From<E> for Failure {
 
 /// Parses the process's arguments and runs the command.
 pub fn run() -> ExitCode {
-    let arguments = Arguments::parse();
+    interrupt::survive_file_limits();
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| end_with_usage(&error));
     files::guard_run();
     let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
@@ -108,23 +110,13 @@ fn read_photo(path: &Path) -> Result<Photo, Failure> {
     Ok(photo)
 }
 
-/// A message to the user, one line.
-fn say(kind: &str, message: &str) {
-    let line = message.trim().replace(['\r', '\n', '\t'], " ");
-    // Without a stderr there is nobody to tell.
-    let _ = writeln!(std::io::stderr(), "{kind}: {line}");
-}
-
-/// A result to stdout. A reader that has heard enough (a closed pipe) is no failure.
-fn print(text: &str) -> Result<(), Failure> {
-    let mut stdout = std::io::stdout();
-    let written = stdout
-        .write_all(text.as_bytes())
-        .and_then(|()| stdout.flush());
-    match written {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure(format!(
-            "the result cannot be written to standard output: {error}"
-        ))),
-        _ => Ok(()),
+/// Help, or why the command line cannot be used. Names of files stand in it too.
+fn end_with_usage(error: &clap::Error) -> ! {
+    let text = error.render().to_string();
+    let safe = terminal::escaped(&text);
+    if safe != text {
+        terminal::print_aside(&text);
+        std::process::exit(error.exit_code());
     }
+    error.exit()
 }

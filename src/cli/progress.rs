@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::terminal::escaped;
 use crate::renderer::Progress;
 
 /// What a render counts: "rays per pixel" or "scrambles".
@@ -63,7 +64,7 @@ impl Steps {
     /// Something within a step.
     pub(super) fn say(&self, message: &str) {
         if let Some(bar) = &self.0 {
-            bar.set_message(message.to_owned());
+            bar.set_message(escaped(message));
         }
     }
 

@@ -8,16 +8,18 @@ mod plain;
 mod png_file;
 mod reference_file;
 mod target;
+mod temporary;
 
 pub use channels::ChannelFile;
 pub use exr_file::{Metadata, write_exr};
 pub use film_file::{FilmNote, read_film, write_film};
 pub use plain::{write_composite, write_image};
-pub(crate) use png_file::picture_codes8;
+pub(crate) use png_file::{PNG_END, picture_codes8};
 pub use png_file::{PngBits, write_png};
 pub use reference_file::write_reference;
-pub(crate) use target::check_writable;
 pub use target::{Format, Target, write_bytes, write_text};
+pub(crate) use target::{check_named, check_writable, quick, sync_folder};
+pub(crate) use temporary::{cut, remove_leftovers};
 
 use std::path::PathBuf;
 

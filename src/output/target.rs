@@ -1,10 +1,12 @@
 //! Output files, checked before the work begins and replaced whole at the end.
 
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::OutputError;
+use super::temporary::{self, cut, remove_leftovers};
 use crate::files;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,10 +60,18 @@ impl Target {
     }
 }
 
-/// Names the output, and fails now if [`write_atomically`] would fail later.
+/// Names the output, removes what ended runs have left of it, and fails now if [`write_atomically`] would fail later.
 pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
+    let (folder, name) = folder_and_name(&check_named(path)?)?;
+    remove_leftovers(&folder, |output| output == cut(&name));
+    Ok(())
+}
+
+/// [`check_writable`], and leaves leftovers to the caller.
+pub(crate) fn check_named(path: &Path) -> Result<PathBuf, OutputError> {
     files::output(path)?;
-    temporary_beside(path).map(|_| ())
+    let (_, target) = temporary_beside(path)?;
+    Ok(target)
 }
 
 /// Replaces the file at `path` by `text`.
@@ -83,21 +93,63 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     })
 }
 
-/// Lets `write` fill a temporary file in the same folder, then renames it to `path`.
+/// As their namesakes, but no power cut is waited for: of what can be measured or drawn again.
+pub(crate) mod quick {
+    use super::{OutputError, Path, Write, io_error, replace};
+
+    pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
+        write_bytes(path, text.as_bytes())
+    }
+
+    pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+        let write = |file: &mut std::io::BufWriter<&std::fs::File>| {
+            file.write_all(bytes)
+                .map_err(|source| io_error(path, source))
+        };
+        replace(path, write, |_| Ok(()))?;
+        Ok(())
+    }
+}
+
+/// Lets `write` fill a temporary file in the same folder, then renames it to `path`. The file is on the disk before it has its name, and
+/// its name is before this ends.
 pub(super) fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&File>) -> Result<(), OutputError>,
 ) -> Result<(), OutputError> {
+    let target = replace(path, write, File::sync_all)?;
+    sync_folder(&target);
+    Ok(())
+}
+
+/// Gives what the file is called, links resolved.
+fn replace(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&File>) -> Result<(), OutputError>,
+    settle: impl FnOnce(&File) -> io::Result<()>,
+) -> Result<PathBuf, OutputError> {
     files::before_write(path)?;
     let (temporary, target) = temporary_beside(path)?;
     let mut writer = BufWriter::new(temporary.as_file());
     write(&mut writer)?;
     writer.flush().map_err(|source| io_error(path, source))?;
     drop(writer);
+    settle(temporary.as_file()).map_err(|source| io_error(path, source))?;
     temporary
-        .persist(target)
+        .persist(&target)
         .map_err(|e| io_error(path, e.error))?;
-    Ok(())
+    Ok(target)
+}
+
+/// The names in the folder of a file that was renamed are on the disk, where the system can say so.
+pub(crate) fn sync_folder(target: &Path) {
+    #[cfg(unix)]
+    if let Ok((folder, _)) = folder_and_name(target)
+        && let Ok(folder) = File::open(folder)
+    {
+        // Some file systems cannot; the file itself is there.
+        let _ = folder.sync_all();
+    }
 }
 
 fn io_error(path: &Path, source: io::Error) -> OutputError {
@@ -105,6 +157,19 @@ fn io_error(path: &Path, source: io::Error) -> OutputError {
         path: path.into(),
         source,
     }
+}
+
+fn folder_and_name(target: &Path) -> Result<(PathBuf, OsString), OutputError> {
+    let Some(name) = target.file_name() else {
+        return Err(OutputError::NotAFile {
+            path: target.into(),
+        });
+    };
+    let folder = match target.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    Ok((folder.into(), name.into()))
 }
 
 /// An empty temporary file in the folder of `path`, and the path to rename it to (links resolved, so that they stay links).
@@ -117,21 +182,8 @@ fn temporary_beside(path: &Path) -> Result<(tempfile::NamedTempFile, PathBuf), O
         Err(e) if e.kind() == io::ErrorKind::NotFound => files::final_target(path),
         Err(e) => return Err(io_error(path, e)),
     };
-    let folder = match target.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".mixray-").suffix(".tmp");
-    #[cfg(unix)]
-    {
-        // tempfile's default of 0600 would leave the picture unreadable for others; the umask still applies.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let temporary = builder
-        .tempfile_in(folder)
-        .map_err(|source| io_error(path, source))?;
+    let (folder, name) = folder_and_name(&target)?;
+    let temporary = temporary::make(&folder, &name).map_err(|source| io_error(path, source))?;
     Ok((temporary, target))
 }
 

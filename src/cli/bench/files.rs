@@ -6,7 +6,7 @@ use super::benchmark::Gallery;
 use crate::bench::{Axis, FORMAT, Plot, Report, csv, page, plots};
 use crate::cli::{Failure, say};
 use crate::files;
-use crate::output::{write_bytes, write_text};
+use crate::output::quick::{write_bytes, write_text};
 
 pub(super) fn write_figures(report: &Report, folder: &Path) -> Result<(), Failure> {
     let mut json = serde_json::to_string_pretty(report)?;

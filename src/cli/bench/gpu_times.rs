@@ -3,7 +3,7 @@
 use super::{Job, command_line, load_scenes};
 use crate::bench::{FORMAT, gpu_time, gpu_time_markdown, gpu_time_text};
 use crate::cli::{Failure, Outcome, interrupt, print, progress};
-use crate::output::write_text;
+use crate::output::quick::write_text;
 
 pub(super) fn gpu_times(job: &Job) -> Result<Outcome, Failure> {
     let interrupted = interrupt::watch()?;

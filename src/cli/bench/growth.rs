@@ -6,7 +6,7 @@ use crate::bench::{
     FORMAT, Law, Machine, Plan, grow, growth_csv, growth_markdown, growth_plot, growth_text,
 };
 use crate::cli::{Failure, Outcome, interrupt, print, progress};
-use crate::output::{write_bytes, write_text};
+use crate::output::quick::{write_bytes, write_text};
 use crate::scene::Choice;
 
 /// Measures these laws, all if none is named; `about` is the machine and what was typed. Gives the table as Markdown too.

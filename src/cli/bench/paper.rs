@@ -6,7 +6,7 @@ use crate::bench::{
     paper_text, picture_png, shrink,
 };
 use crate::cli::{Failure, Outcome, interrupt, print, progress};
-use crate::output::{write_bytes, write_text};
+use crate::output::quick::{write_bytes, write_text};
 use crate::scene;
 
 pub(super) fn paper_table(job: &Job) -> Result<Outcome, Failure> {

@@ -7,7 +7,7 @@ use crate::bench::Machine;
 use crate::bench::stress::{Backend, Effort, Report, cases, csv, markdown, text};
 use crate::cli::{Failure, Outcome, interrupt, print, progress, say};
 use crate::gpu::{AdapterChoice, GpuDevice};
-use crate::output::write_text;
+use crate::output::quick::write_text;
 
 /// On the CPU, and on the machine's graphics adapter if it names one. Gives the table as Markdown too.
 pub(super) fn run(

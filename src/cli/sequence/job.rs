@@ -1,6 +1,5 @@
 //! The frames one after the other.
 
-use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
@@ -11,6 +10,7 @@ use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
 use super::report::{Frames, Seconds, Stats};
 use crate::cli::progress::Steps;
 use crate::cli::render::say_idle;
+use crate::cli::terminal::print_aside;
 use crate::cli::{Failure, Outcome, interrupt, print, say};
 use crate::output::{check_writable, write_text};
 use crate::packed::next_anchor;
@@ -169,7 +169,7 @@ impl Sequence<'_> {
             // The same for every frame whichever run renders it.
             started.anchor = Some(next_anchor(started.anchor, position));
         }
-        let there = started.sink.has(name)?;
+        let there = started.sink.has(name, &frame)?;
         let Some(world_from_camera) = view.world_from_camera else {
             if there {
                 self.frames.kept += 1;
@@ -300,7 +300,9 @@ impl Sequence<'_> {
         scene.photo = None;
         let arguments = self.arguments;
         let fits = scene.settings.exposure == Exposure::Auto;
-        let scope = match fits || arguments.focus_pull.is_some() {
+        // A file tells by their order which frames it holds.
+        let is_file = self.output.extension().is_some_and(|e| e == "y4m");
+        let scope = match fits || arguments.focus_pull.is_some() || is_file {
             true => format!("{:?} {:?}", arguments.range, self.span),
             false => String::new(),
         };
@@ -369,8 +371,8 @@ impl Sequence<'_> {
         }
         let text = stats.text(&self.output.display().to_string());
         if self.output == Path::new("-") {
-            // Standard output is the film. Without a stderr there is nobody to tell.
-            let _ = std::io::stderr().write_all(text.as_bytes());
+            // Standard output is the film.
+            print_aside(&text);
         } else {
             print(&text)?;
         }
