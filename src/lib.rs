@@ -34,6 +34,8 @@ pub mod output;
 pub mod packed;
 pub mod renderer;
 pub mod scene;
+pub mod shared;
 pub mod stages;
 
 pub mod video;
+pub mod work;

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mixray::film::Picture;
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{BackendChoice, EncodedPhoto, LightKind, Material, Photo, Scene};
 
 /// Runs of a comparison: their spread is the standard error.
@@ -132,9 +132,9 @@ fn render(scene: &Scene, backend: BackendChoice, rays_per_pixel: u32) -> Vec<Pic
             scene.settings.rays_per_pixel = rays_per_pixel;
             scene.settings.seed = seed;
             scene.settings.backend = backend;
-            let mut renderer =
-                Renderer::new(scene, RendererOptions::default()).expect("scene fits");
-            (renderer.advance(Budget::Complete, &|| false, &mut |_| ())).expect("renders");
+            let mut renderer = Renderer::new(scene, RendererOptions::default(), &Watcher::none())
+                .expect("scene fits");
+            (renderer.advance(Budget::Complete, &Watcher::none())).expect("renders");
             renderer.picture()
         })
         .collect()

@@ -1,4 +1,4 @@
-//! The quick cut of the stress test: every case on the CPU and on a graphics device, and every case's control. `mixray bench --stress` runs
+//! The quick cut of the stress test: every case on the CPU and on a graphics device, and every case's control. `mixray bench stress` runs
 //! the whole.
 
 use std::sync::Arc;

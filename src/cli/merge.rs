@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use super::picture_flags::png_bits;
+use super::progress::Bar;
 use super::render::write;
+use super::values::png_bits;
 use super::{Failure, Outcome, print, say};
 use crate::film::Film;
 use crate::output::{FilmNote, PngBits, Target, read_film};
-use crate::renderer::Renderer;
+use crate::renderer::{Progress, Renderer, Watcher};
 use crate::scene::{self, BackendChoice, Scene};
 
 /// Puts films of sample ranges together
@@ -29,7 +29,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     scene: Option<PathBuf>,
     /// Bits a channel of PNG pictures [default: 16 for a 16-bit photograph, else 8]
-    #[arg(long, value_parser = PossibleValuesParser::new(["8", "16"]).map(png_bits))]
+    #[arg(long, value_parser = png_bits())]
     png_bits: Option<PngBits>,
     /// Frame number of a video: with [noise], every frame has its own
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -67,7 +67,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         range.1 = part.note.range.1;
     }
     let total = first.note.total;
-    let renderer = Renderer::with_film(scene, film, range.1, first.note.without)?;
+    let bar = Bar::new("building trees", "rays per pixel");
+    let hear = |progress: &Progress| bar.hear(progress);
+    let renderer = Renderer::with_film(
+        scene,
+        film,
+        range.1,
+        first.note.without,
+        &Watcher::none().heard_by(&hear),
+    )?;
+    drop(bar);
     let complete = range == (0, total);
     write(
         &renderer,

@@ -20,6 +20,8 @@ mod sequence;
 mod stage_device;
 mod summary;
 mod terminal;
+mod threads;
+mod values;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -79,7 +81,7 @@ pub fn run() -> ExitCode {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Sequence(arguments) => sequence::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
-        Command::Bench(arguments) => arguments.check().and_then(bench::run),
+        Command::Bench(arguments) => bench::run(arguments),
         Command::Cartoon(arguments) => cartoon::run(&arguments),
         Command::Noise(arguments) => noise::run(&arguments),
         Command::Antialias(arguments) => antialias::run(&arguments),

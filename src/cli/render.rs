@@ -1,21 +1,22 @@
 //! `mixray render`: a scene file to pictures.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::picture_flags::PictureFlags;
-use super::{Failure, Outcome, interrupt, print, progress, say, summary};
+use super::progress::Bar;
+use super::values::{above_zero, camera_noise, whole_range};
+use super::{Failure, Outcome, interrupt, print, say, summary};
 use crate::output::{
     FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr, write_film, write_png,
     write_text,
 };
 use crate::renderer::{
-    Budget, CameraNoise, ErrorGoal, Renderer, RendererOptions, SCRAMBLES, Stats,
+    Budget, CameraNoise, ErrorGoal, Progress, Renderer, RendererOptions, SCRAMBLES, Stats, Watcher,
 };
-use crate::scene::{self, Choice, MotionBlurMethod, NoiseFit, NoiseProfile, Overrides};
+use crate::scene::{self, MotionBlurMethod, Overrides};
 use crate::stages::{GpuStages, finish};
 
 /// Renders a scene's virtual objects into its photograph
@@ -31,7 +32,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     flags: PictureFlags,
     /// Render only these of each pixel's rays, FROM to TO - 1, into an .exr that `mixray merge` puts together with the others
-    #[arg(long, value_name = "FROM..TO", value_parser = sample_range)]
+    #[arg(long, value_name = "FROM..TO", value_parser = whole_range)]
     range: Option<(u32, u32)>,
     /// Render until the standard error of the composite is down to this, root mean square over each tile of 16 x 16 pixels, linear;
     /// --rpp then limits the rays of a pixel [default: 16384]
@@ -50,11 +51,6 @@ pub(super) struct Arguments {
     /// Frame number of a video: with [noise], every frame has its own
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
-}
-
-pub(super) fn choice<T: Choice + Send + Sync>() -> impl TypedValueParser<Value = T> {
-    let names = T::CHOICES.iter().map(|&(name, _)| name);
-    PossibleValuesParser::new(names).try_map(|name| T::from_name(&name).ok_or("is not a choice"))
 }
 
 /// What was asked for, with outputs that can be written.
@@ -131,6 +127,11 @@ impl Arguments {
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     job.flags.start_threads()?;
     let start = Instant::now();
+    let unit = match job.goal {
+        Some(_) => "scrambles",
+        None => "rays per pixel",
+    };
+    let bar = Bar::new("reading the scene", unit);
     let mut scene = scene::load(&job.scene)?;
     scene.settings.apply(&job.overrides);
     let mut goal = job.goal;
@@ -145,9 +146,11 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
             fit: noise.profile.fit,
         });
     }
-    for warning in &scene.warnings {
-        say("warning", warning);
-    }
+    bar.aside(|| {
+        for warning in &scene.warnings {
+            say("warning", warning);
+        }
+    });
     let targets = match job.targets.as_slice() {
         [] => vec![Target::picture(&PathBuf::from(format!(
             "{}.png",
@@ -163,25 +166,20 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         without: job.flags.without(),
         filter: job.filter,
     };
-    let mut renderer = Renderer::new(scene, options)?;
+    let hear = |progress: &Progress| bar.hear(progress);
+    let watcher = Watcher::none().heard_by(&hear);
+    let mut renderer = Renderer::new(scene, options, &watcher)?;
     let without = renderer.without();
-    say_idle(&renderer, goal.as_ref());
+    bar.aside(|| say_idle(&renderer, goal.as_ref()));
     let goal = goal.map(|goal| goal.without(without));
     let interrupted = interrupt::watch()?;
-    let (first, end) = (job.range).unwrap_or((0, renderer.scene().settings.rays_per_pixel));
-    let unit = if goal.is_some() {
-        "scrambles"
-    } else {
-        "rays per pixel"
-    };
-    let bar = progress::Bar::new(end - first, unit);
     let cancelled = || interrupted.is_set();
-    let result = match &goal {
-        Some(goal) => renderer.render_to_error(goal, &cancelled, &mut |p| bar.show(&p)),
-        None => renderer.advance(Budget::Complete, &cancelled, &mut |p| bar.show(&p)),
-    };
-    bar.clear();
-    result?;
+    let watcher = watcher.cancelled_by(&cancelled);
+    match &goal {
+        Some(goal) => renderer.render_to_error(goal, &watcher)?,
+        None => renderer.advance(Budget::Complete, &watcher)?,
+    }
+    drop(bar);
     for note in renderer.notes() {
         say("note", note);
     }
@@ -269,34 +267,6 @@ pub(super) fn write(
     Ok(())
 }
 
-pub(super) fn above_zero(text: &str) -> Result<f64, &'static str> {
-    match text.parse::<f64>() {
-        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        _ => Err("expected a number above 0"),
-    }
-}
-
-/// "0.01,0.2", or the name of a file.
-pub(super) fn camera_noise(text: &str) -> Result<CameraNoise, Failure> {
-    let parse = |part: &str| part.trim().parse::<f64>().ok();
-    let numbers: Option<Vec<f64>> = text.split(',').map(parse).collect();
-    match numbers.as_deref() {
-        Some(&[a, b]) if a >= 0.0 && b >= 0.0 && a + b > 0.0 && (a + b).is_finite() => {
-            Ok(CameraNoise {
-                fit: [NoiseFit { a, b }; 3],
-            })
-        }
-        Some(_) => Err(Failure(format!(
-            "--camera-noise {text}: expected two numbers of 0 or more, not both 0, such as 0.02,0.5"
-        ))),
-        None => {
-            let profile = NoiseProfile::read(Path::new(text))
-                .map_err(|problem| Failure(format!("{text}: {problem}")))?;
-            Ok(CameraNoise { fit: profile.fit })
-        }
-    }
-}
-
 /// Says which savings were switched off in vain.
 pub(super) fn say_idle(renderer: &Renderer, goal: Option<&ErrorGoal>) {
     let estimator = renderer.scene().settings.estimator;
@@ -306,16 +276,6 @@ pub(super) fn say_idle(renderer: &Renderer, goal: Option<&ErrorGoal>) {
             "note",
             &format!("--no-skip {name} changes nothing here: {reason}"),
         );
-    }
-}
-
-/// "16..32".
-fn sample_range(text: &str) -> Result<(u32, u32), &'static str> {
-    let ends = text.split_once("..");
-    let parsed = ends.and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?)));
-    match parsed {
-        Some((from, to)) if from < to => Ok((from, to)),
-        _ => Err("expected FROM..TO, two whole numbers, the first below the second"),
     }
 }
 

@@ -1,9 +1,10 @@
 //! The buffers of a batch of samples in flight: bind group 1, as `shaders/gpu/lanes.wgsl` declares it.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck::{AnyBitPattern, Pod, Zeroable};
 
-use super::{GpuDevice, GpuError, PixelWork};
+use super::{GpuDevice, GpuError};
 use crate::film::{GuideSums, PixelSums};
+use crate::work::{PixelWork, RayCounts};
 
 /// Twin of the shader's `Batch`.
 #[repr(C)]
@@ -22,13 +23,12 @@ pub struct Batch {
 
 /// What the device counts while a batch runs.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, AnyBitPattern)]
 pub struct Counters {
     pub lanes_in: u32,
     pub lanes_out: u32,
     pub steps: u32,
-    /// Primary, mixed, real, mixed shadow, real shadow.
-    pub rays: [u32; 5],
+    pub rays: RayCounts<u32>,
 }
 
 pub const COUNTERS_BYTES: u64 = size_of::<Counters>() as u64;
@@ -117,18 +117,18 @@ impl Lanes {
         })
     }
 
-    /// The buffer of a binding of group 1; `parity` says which queue is read.
-    pub fn get(&self, binding: u32, parity: usize) -> Option<&wgpu::Buffer> {
-        Some(match binding {
-            0 => &self.batch,
-            1 => &self.work,
-            2 => &self.paths,
-            3 => &self.queues[parity],
-            4 => &self.queues[1 - parity],
-            5 => &self.counters,
-            6 => &self.indirect,
-            7 => &self.pixel_sums,
-            8 => &self.guide_sums,
+    /// The buffer of that name in `shaders/gpu/lanes.wgsl`; `parity` says which queue is read.
+    pub fn get(&self, name: &str, parity: usize) -> Option<&wgpu::Buffer> {
+        Some(match name {
+            "batch" => &self.batch,
+            "work" => &self.work,
+            "paths" => &self.paths,
+            "queue_in" => &self.queues[parity],
+            "queue_out" => &self.queues[1 - parity],
+            "counters" => &self.counters,
+            "indirect" => &self.indirect,
+            "pixel_sums" => &self.pixel_sums,
+            "guide_sums" => &self.guide_sums,
             _ => return None,
         })
     }
@@ -144,6 +144,10 @@ impl Lanes {
         write(&self.work, bytemuck::cast_slice(work));
         write(&self.pixel_sums, bytemuck::cast_slice(sums));
         write(&self.guide_sums, bytemuck::cast_slice(guides));
+    }
+
+    pub fn clear_counters(&self, gpu: &GpuDevice) {
+        (gpu.queue).write_buffer(&self.counters, 0, &[0; COUNTERS_BYTES as usize]);
     }
 
     pub fn copy_counters(&self, encoder: &mut wgpu::CommandEncoder) {

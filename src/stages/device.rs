@@ -116,20 +116,20 @@ impl GpuStages {
         buffer
     }
 
-    /// One thread for each of `width` x `height`. `buffers` are (group, binding, buffer).
+    /// One thread for each of `width` x `height`. `buffers` are by their names in the shader.
     pub(super) fn dispatch(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         entry_point: &'static str,
-        buffers: &[(u32, u32, &wgpu::Buffer)],
+        buffers: &[(&str, &wgpu::Buffer)],
         (width, height): (u32, u32),
     ) -> Result<(), GpuError> {
         let kernel = self.kernel(entry_point)?;
-        let groups = kernel.bind(&self.gpu, |group, binding| {
+        let groups = kernel.bind(&self.gpu, |name| {
             buffers
                 .iter()
-                .find(|(g, b, _)| (*g, *b) == (group, binding))
-                .map(|(_, _, buffer)| *buffer)
+                .find(|(given, _)| *given == name)
+                .map(|(_, buffer)| *buffer)
         })?;
         let mut pass = encoder.begin_compute_pass(&Default::default());
         kernel.set(&mut pass, &groups);

@@ -4,4 +4,5 @@ mod ablation;
 mod growth;
 mod merge;
 mod rows;
+mod subcommands;
 mod support;

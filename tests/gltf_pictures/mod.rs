@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat4, DVec3};
 use mixray::film::Picture;
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{AlphaMode, Instance, Material, Scene, load};
 
 /// A folder of the shared data; None, said aloud, where the data is not there.
@@ -168,9 +168,9 @@ struct Shot {
 }
 
 fn shoot(scene: Scene) -> Shot {
-    let mut renderer = Renderer::new(scene, RendererOptions::default()).unwrap();
+    let mut renderer = Renderer::new(scene, RendererOptions::default(), &Watcher::none()).unwrap();
     renderer
-        .advance(Budget::Complete, &|| false, &mut |_| ())
+        .advance(Budget::Complete, &Watcher::none())
         .unwrap();
     let film = renderer.film();
     assert_eq!(film.non_finite_samples(), 0);

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use mixray::film::{Film, Picture};
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{BackendChoice, EncodedPhoto, Photo, Scene};
 
 /// Turns checks `fn(BackendChoice)` into tests, one a backend.
@@ -61,7 +61,7 @@ pub fn scene(text: &str) -> Scene {
 pub fn renderer(scene: &Scene, backend: BackendChoice, options: RendererOptions) -> Renderer {
     let mut scene = scene.clone();
     scene.settings.backend = backend;
-    Renderer::new(scene, options).expect("the scene fits")
+    Renderer::new(scene, options, &Watcher::none()).expect("the scene fits")
 }
 
 /// Renders all rays.
@@ -73,7 +73,7 @@ pub fn render(scene: &Scene, backend: BackendChoice) -> Renderer {
 
 pub fn complete(renderer: &mut Renderer) {
     renderer
-        .advance(Budget::Complete, &|| false, &mut |_| ())
+        .advance(Budget::Complete, &Watcher::none())
         .expect("the render completes");
     assert_eq!(renderer.film().non_finite_samples(), 0);
 }

@@ -6,7 +6,7 @@ use std::process::Stdio;
 
 use glam::{DMat4, DVec3};
 use mixray::camera::lens::project;
-use mixray::renderer::{Budget, FrameEdit, Renderer, RendererOptions};
+use mixray::renderer::{Budget, FrameEdit, Renderer, RendererOptions, Watcher};
 use mixray::scene::trajectory::{CameraPath, FrameName, Trajectory, Views};
 
 use super::support::{BALL, Folder, scene, sequence, y4m};
@@ -92,7 +92,8 @@ fn an_object_stays_where_the_poses_put_it() {
         [[virtual]]\nshape = \"sphere\"\nscale = 0.04\ntranslation = [0.1, 0.05, -1]\nmaterial = { base_color = [1, 1, 1], unlit = true }\n[render]\nrays_per_pixel = 256\nbackend = \"cpu\"\n";
     let scene = scene(text);
     let centre = DVec3::new(0.1, 0.05, -1.0);
-    let mut renderer = Renderer::new(scene.clone(), RendererOptions::default()).expect("fits");
+    let mut renderer =
+        Renderer::new(scene.clone(), RendererOptions::default(), &Watcher::none()).expect("fits");
     for number in 0..5 {
         let along = f64::from(number);
         let pose = DMat4::from_translation(DVec3::new(0.05 * along, -0.02 * along, 0.4 * along))
@@ -109,9 +110,9 @@ fn an_object_stays_where_the_poses_put_it() {
             seed: number,
             anchor: None,
         };
-        renderer.set_frame(edit).expect("fits");
+        renderer.set_frame(edit, &Watcher::none()).expect("fits");
         renderer
-            .advance(Budget::Complete, &|| false, &mut |_| ())
+            .advance(Budget::Complete, &Watcher::none())
             .expect("renders");
         let film = renderer.film();
         let mut sums = DVec3::ZERO;

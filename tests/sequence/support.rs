@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use image::{Rgb, RgbImage};
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{BackendChoice, Scene};
 
 /// A white square of 40 px in the middle of 96 x 24, one metre away, a pixel a centimetre.
@@ -28,9 +28,10 @@ pub fn scene(text: &str) -> Scene {
 pub fn render(text: &str, backend: BackendChoice) -> Renderer {
     let mut scene = scene(text);
     scene.settings.backend = backend;
-    let mut renderer = Renderer::new(scene, RendererOptions::default()).expect("the scene fits");
+    let mut renderer =
+        Renderer::new(scene, RendererOptions::default(), &Watcher::none()).expect("the scene fits");
     renderer
-        .advance(Budget::Complete, &|| false, &mut |_| ())
+        .advance(Budget::Complete, &Watcher::none())
         .expect("renders");
     assert_eq!(renderer.film().non_finite_samples(), 0);
     renderer

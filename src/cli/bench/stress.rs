@@ -1,32 +1,60 @@
-//! `mixray bench --stress`: numerical stability, case by case.
+//! `mixray bench stress`: numerical stability, case by case.
 
-use std::path::Path;
 use std::sync::Arc;
 
+use clap::Args;
+
+use super::command_line;
+use super::flags::{OutputFlags, finish};
 use crate::bench::Machine;
 use crate::bench::stress::{Backend, Effort, Report, cases, csv, markdown, text};
+use crate::cli::values::choice;
 use crate::cli::{Failure, Outcome, interrupt, print, progress, say};
 use crate::gpu::{AdapterChoice, GpuDevice};
 use crate::output::quick::write_text;
+use crate::scene::BackendChoice;
 
-/// On the CPU, and on the machine's graphics adapter if it names one. Gives the table as Markdown too.
-pub(super) fn run(
-    folder: &Path,
-    machine: &Machine,
-    command: &str,
-) -> Result<(Outcome, String), Failure> {
-    let mut backends = vec![Backend::Cpu];
-    if machine.gpu.is_some() {
-        backends.push(Backend::gpu(Arc::new(GpuDevice::open(AdapterChoice::Any)?)));
-    } else {
-        say("note", "no graphics device: only the CPU is tested");
+/// Numerical stability: a table of hard cases, each with the figure that it must hold against closed forms and f64 brute force; minutes
+///
+/// Writes stress.json, stress.csv and stress.md; exits with 1 if a case fails.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Where to render [default: cpu, and gpu where there is a graphics device of any kind]
+    #[arg(long, value_delimiter = ',', value_parser = choice::<BackendChoice>())]
+    backends: Vec<BackendChoice>,
+    #[command(flatten)]
+    output: OutputFlags,
+}
+
+impl Arguments {
+    fn backends(&self, machine: &Machine) -> Result<Vec<Backend>, Failure> {
+        let any = self.backends.is_empty() || self.backends.contains(&BackendChoice::Auto);
+        let mut backends = Vec::new();
+        if any || self.backends.contains(&BackendChoice::Cpu) {
+            backends.push(Backend::Cpu);
+        }
+        if self.backends.contains(&BackendChoice::Gpu) || (any && machine.gpu.is_some()) {
+            backends.push(Backend::gpu(Arc::new(GpuDevice::open(AdapterChoice::Any)?)));
+        } else if any {
+            say("note", "no graphics device: only the CPU is tested");
+        }
+        Ok(backends)
     }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let docs = arguments.output.start("stress")?;
+    let machine = Machine::this(arguments.backends.as_slice() != [BackendChoice::Cpu]);
+    let mut backends = arguments.backends(&machine)?;
+    let folder = arguments
+        .output
+        .make_folder(&["stress.json", "stress.csv", "stress.md"])?;
     let interrupted = interrupt::watch()?;
     let cases = cases();
     let mut report = Report {
         mixray: env!("CARGO_PKG_VERSION").to_owned(),
-        command: command.to_owned(),
-        machine: machine.clone(),
+        command: command_line(),
+        machine,
         figures: Vec::new(),
         controls: Vec::new(),
     };
@@ -61,11 +89,9 @@ pub(super) fn run(
     let table = markdown(&report, &cases);
     write_text(&folder.join("stress.md"), &table)?;
     print(&text(&report))?;
-    if interrupted.is_set() {
-        return Ok((Outcome::Interrupted, table));
-    }
-    if report.passed() {
-        return Ok((Outcome::Done, table));
+    let outcome = finish(docs, &table, interrupted.is_set())?;
+    if outcome == Outcome::Interrupted || report.passed() {
+        return Ok(outcome);
     }
     let failed = report.figures.iter().filter(|figure| !figure.passed);
     let names: Vec<String> = failed
@@ -79,5 +105,5 @@ pub(super) fn run(
         )
         .collect();
     say("check failed", &names.join("; "));
-    Ok((Outcome::CheckFailed, table))
+    Ok(Outcome::CheckFailed)
 }

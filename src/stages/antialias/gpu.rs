@@ -46,10 +46,10 @@ impl GpuStages {
             &mut encoder,
             "stage_antialias",
             &[
-                (0, 0, &params),
-                (0, 1, &source),
-                (0, 2, &mask),
-                (0, 3, &result),
+                ("params", &params),
+                ("source", &source),
+                ("mask", &mask),
+                ("picture", &result),
             ],
             (picture.width, picture.height),
         )?;

@@ -82,10 +82,10 @@ impl GpuStages {
             .chain(["stage_respond"]);
         for pass in passes {
             let buffers = [
-                (0, 0, &params),
-                (0, 1, &pixels),
-                (0, 2, &simplified),
-                (0, 3, &next),
+                ("params", &params),
+                ("image", &pixels),
+                ("simplified", &simplified),
+                ("next", &next),
             ];
             self.dispatch(&mut encoder, pass, &buffers, small)?;
             std::mem::swap(&mut simplified, &mut next);
@@ -97,11 +97,11 @@ impl GpuStages {
             }
         };
         let buffers = [
-            (0, 0, &params),
-            (0, 1, &pixels),
-            (0, 2, &simplified),
-            (0, 4, &lines),
-            (0, 5, &result),
+            ("params", &params),
+            ("image", &pixels),
+            ("simplified", &simplified),
+            ("lines", &lines),
+            ("result", &result),
         ];
         self.dispatch(&mut encoder, "stage_compose", &buffers, size)?;
         let words = if with_edges { 6 * count } else { 3 * count };
@@ -159,14 +159,14 @@ impl GpuStages {
             "stage_along",
         ] {
             let buffers = [
-                (0, 0, params),
-                (0, 1, pixels),
-                (1, 0, &flow),
-                (1, 1, &weights),
-                (1, 2, &field),
-                (1, 3, &next),
-                (1, 4, &lines),
-                (1, 5, &luma),
+                ("params", params),
+                ("image", pixels),
+                ("flow", &flow),
+                ("weights", &weights),
+                ("field", &field),
+                ("next_field", &next),
+                ("lines_out", &lines),
+                ("luma", &luma),
             ];
             self.dispatch(encoder, pass, &buffers, size)?;
             std::mem::swap(&mut field, &mut next);

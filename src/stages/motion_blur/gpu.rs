@@ -51,7 +51,7 @@ impl GpuStages {
             self.dispatch(
                 &mut encoder,
                 "stage_copies",
-                &[(0, 0, &params), (0, 1, &layer), (0, 2, &result)],
+                &[("params", &params), ("layer", &layer), ("canvas", &result)],
                 (width, height),
             )?;
         }

@@ -84,14 +84,14 @@ impl GpuStages {
                 let white = self.room("noise", 4 * wide.0 as usize * wide.1 as usize)?;
                 let params = self.uniform(&params);
                 let buffers = [
-                    (0, 0, &params),
-                    (0, 1, &values),
-                    (0, 2, &photo),
-                    (0, 3, &mask),
-                    (0, 4, &ratio),
-                    (0, 5, &variance),
-                    (0, 6, &weights),
-                    (0, 7, &white),
+                    ("params", &params),
+                    ("picture", &values),
+                    ("photo", &photo),
+                    ("mask", &mask),
+                    ("ratio", &ratio),
+                    ("variance", &variance),
+                    ("weights", &weights),
+                    ("white", &white),
                 ];
                 self.dispatch(&mut encoder, "stage_white", &buffers, wide)?;
                 self.dispatch(&mut encoder, "stage_missing", &buffers, size)?;
@@ -106,10 +106,10 @@ impl GpuStages {
                 let texels = self.array("noise textures", &texels)?;
                 let params = self.uniform(&params);
                 let buffers = [
-                    (0, 0, &params),
-                    (0, 1, &values),
-                    (0, 3, &mask),
-                    (0, 8, &texels),
+                    ("params", &params),
+                    ("picture", &values),
+                    ("mask", &mask),
+                    ("textures", &texels),
                 ];
                 self.dispatch(&mut encoder, "stage_textures", &buffers, size)?;
             }

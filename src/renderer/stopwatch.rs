@@ -5,16 +5,16 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 
 /// Started when made.
-pub(super) struct Watch {
+pub(super) struct Stopwatch {
     pub begin: Instant,
-    cpu: ProcessTime,
+    processor_secs: f64,
 }
 
-impl Watch {
+impl Stopwatch {
     pub fn start() -> Self {
         Self {
             begin: Instant::now(),
-            cpu: ProcessTime::now(),
+            processor_secs: processor_secs(),
         }
     }
 
@@ -25,6 +25,11 @@ impl Watch {
 
     /// Seconds of the processors in all of the process's threads.
     pub fn cpu_secs(&self) -> f64 {
-        self.cpu.elapsed().as_secs_f64()
+        processor_secs() - self.processor_secs
     }
+}
+
+/// Seconds that the processors have spent on the process.
+fn processor_secs() -> f64 {
+    ProcessTime::now().as_duration().as_secs_f64()
 }
