@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
+use super::pool;
 use super::terminal::escaped;
 use crate::renderer::{Phase, Progress};
 
@@ -24,7 +25,7 @@ impl Bar {
             let bar = ProgressBar::new(PARTS);
             set_template(&bar, "{prefix} {wide_bar} {percent:>3}%{msg}");
             bar.set_prefix(doing);
-            bar.enable_steady_tick(Duration::from_millis(200));
+            tick(&bar, 200);
             bar
         });
         Self { bar, unit }
@@ -77,7 +78,7 @@ impl Steps {
         }
         let bar = ProgressBar::new(count);
         set_template(&bar, "{bar:24} {pos}/{len}, {elapsed}: {wide_msg}");
-        bar.enable_steady_tick(Duration::from_millis(500));
+        tick(&bar, 500);
         Self(Some(bar))
     }
 
@@ -99,6 +100,13 @@ impl Steps {
         if let Some(bar) = &self.0 {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// Moves on its own, where a thread can be made for that.
+fn tick(bar: &ProgressBar, milliseconds: u64) {
+    if pool::can_spawn() {
+        bar.enable_steady_tick(Duration::from_millis(milliseconds));
     }
 }
 

@@ -77,24 +77,6 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// Reads a whole file.
-///
-/// # Errors
-/// As [`std::fs::read`] and [`input`].
-pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
-    input(path)?;
-    std::fs::read(path)
-}
-
-/// Reads a whole file of UTF-8 text.
-///
-/// # Errors
-/// As [`std::fs::read_to_string`] and [`input`].
-pub(crate) fn read_to_string(path: &Path) -> io::Result<String> {
-    input(path)?;
-    std::fs::read_to_string(path)
-}
-
 /// Names an output. Each is named once.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! Host side of `shaders/stages/noise/mod.wgsl`.
+//! Host side of `shaders/stages/noise/gpu.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -8,9 +8,12 @@ use crate::stages::GpuStages;
 use crate::stages::noise::{NoiseInput, NoiseSource, NoiseStage, sigma_table};
 use crate::stages::settings::LAGS;
 
+/// Of the shaders.
+const MODULE: &str = "stages::noise::gpu";
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(in crate::stages) struct NoiseParams {
+struct NoiseParams {
     width: u32,
     height: u32,
     bins: u32,
@@ -93,8 +96,8 @@ impl GpuStages {
                     ("weights", &weights),
                     ("white", &white),
                 ];
-                self.dispatch(&mut encoder, "stage_white", &buffers, wide)?;
-                self.dispatch(&mut encoder, "stage_missing", &buffers, size)?;
+                self.dispatch(&mut encoder, (MODULE, "stage_white"), &buffers, wide)?;
+                self.dispatch(&mut encoder, (MODULE, "stage_missing"), &buffers, size)?;
             }
             NoiseSource::Textures(textures) => {
                 let placement = textures.placement(frame);
@@ -111,7 +114,7 @@ impl GpuStages {
                     ("mask", &mask),
                     ("textures", &texels),
                 ];
-                self.dispatch(&mut encoder, "stage_textures", &buffers, size)?;
+                self.dispatch(&mut encoder, (MODULE, "stage_textures"), &buffers, size)?;
             }
         }
         let words = self.finish(encoder, &values, 3 * count)?;
