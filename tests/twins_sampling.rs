@@ -69,7 +69,7 @@ fn random(i: u32) -> f32 {
     uniform_from_bits(hash_u32(i.wrapping_add(1)))
 }
 
-const SAMPLE: &str = "import package::sampler::{sample_4d, SampleKey};";
+const SAMPLE: &str = "import package::camera::sampler::{sample_4d, SampleKey};";
 const SAMPLE_BODY: &str = "
     let v = sample_4d(SampleKey(input(0u), input(1u), input(2u), input(3u), input(4u)), input(5u));
     output_f32(0u, v.x); output_f32(1u, v.y); output_f32(2u, v.z); output_f32(3u, v.w);";
@@ -260,7 +260,7 @@ fn frame(distortion: [f64; 5], aperture: Aperture, aperture_radius_m: f64) -> Fr
 
 #[test]
 fn camera_rays_agree() {
-    let prelude = "import package::lens::{camera_ray, camera_project, sample_lens};";
+    let prelude = "import package::camera::lens::{camera_ray, camera_project, sample_lens};";
     let body = "
         let ray = camera_ray(input_f32(0u), input_f32(1u), input_f32(2u), input_f32(3u));
         let seen = camera_project(ray.origin + 2.0 * ray.direction);

@@ -1,7 +1,7 @@
 //! Acceleration structures: one over the real, one over the virtual triangles.
 //!
 //! obvhs builds one BVH2 a world (`binary`). From it come an 8-wide tree of f32 boxes for the CPU (`wide`, traversed by `trace`) and a
-//! compressed wide tree for the GPU (`compressed`, traversed by `shaders/trace.wgsl`). Both test triangles with the watertight test of
+//! compressed wide tree for the GPU (`compressed`, traversed by `shaders/accel/trace.wgsl`). Both test triangles with the watertight test of
 //! Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013, in the same f32 operations, and decide equal distances by
 //! the smaller triangle id, so that they report the same hits.
 //!

@@ -1,4 +1,4 @@
-//! Traversal of the CPU's tree and the triangle test. Twin of `shaders/trace.wgsl`: the triangle test there does the same f32 operations.
+//! Traversal of the CPU's tree and the triangle test. Twin of `shaders/accel/trace.wgsl`: the triangle test there does the same f32 operations.
 
 use super::wide::{Eight, TriangleBlock, WideBvh, WideNode};
 use super::{Hit, Ray};

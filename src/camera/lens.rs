@@ -1,6 +1,6 @@
 //! Camera rays through a thin lens, and the projection that inverts them.
 //!
-//! The f32 half has a WGSL twin, `shaders/lens.wgsl`, with the same function names and operations. A ray from a point of the lens
+//! The f32 half has a WGSL twin, `shaders/camera/lens.wgsl`, with the same function names and operations. A ray from a point of the lens
 //! passes through the point of the focus plane that the pinhole ray of its pixel meets: focus lies on a plane across the view axis.
 
 use glam::{DVec3, Vec3};

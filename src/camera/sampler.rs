@@ -8,7 +8,7 @@
 //! - `sobol`: the first four Sobol dimensions with a hash-based Owen scramble (Laine and Karras 2011; Burley, "Practical Hash-based
 //!   Owen Scrambling", 2020). Set 0 is four-dimensional; other sets draw their points in an order of their own. Does not depend on `total`.
 //!
-//! Everything up to the last conversion is integer arithmetic: the WGSL twin `shaders/sampler.wgsl` agrees bit for bit.
+//! Everything up to the last conversion is integer arithmetic: the WGSL twin `shaders/camera/sampler.wgsl` agrees bit for bit.
 
 use crate::math::{hash_combine, hash_u32, uniform_from_bits};
 

@@ -1,4 +1,4 @@
-//! Where the camera is while the shutter is open. WGSL twin: `shaders/shutter.wgsl`.
+//! Where the camera is while the shutter is open. WGSL twin: `shaders/camera/shutter.wgsl`.
 //!
 //! The way is cut into equal pieces of time; within one the position moves along a straight line and the orientation's quaternion too, made
 //! a unit again.

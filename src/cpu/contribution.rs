@@ -1,4 +1,4 @@
-//! What estimator and vertex share: random numbers of a decision, weights, accumulation. WGSL twin: `shaders/contribution.wgsl`.
+//! What estimator and vertex share: random numbers of a decision, weights, accumulation. WGSL twin: `shaders/cpu/contribution.wgsl`.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! The estimator as a state machine: what a sample does with the hits it asked for. WGSL twin: `shaders/estimator.wgsl`.
+//! The estimator as a state machine: what a sample does with the hits it asked for. WGSL twin: `shaders/cpu/estimator.wgsl`.
 //!
 //! `direct` estimates the difference D = Im - Ir where it arises (docs/estimator.md): at a real vertex, (a) lights that virtual geometry blocks
 //! or that are virtual, (b) directions inside the cones of the virtual bounding spheres, (c) the recursion along the BSDF. `paper` follows the

@@ -1,4 +1,4 @@
-//! Answers a sample's ray request. WGSL twin: `shaders/request.wgsl`.
+//! Answers a sample's ray request. WGSL twin: `shaders/cpu/request.wgsl`.
 
 use super::state::*;
 use crate::accel::{Hit, Ray};

@@ -1,4 +1,4 @@
-//! The state of one sample in flight. WGSL twin: `shaders/state.wgsl`.
+//! The state of one sample in flight. WGSL twin: `shaders/cpu/state.wgsl`.
 //!
 //! A sample is a small state machine: it asks for rays ([`Request`] bits), is given hits, and asks again until it is done. Both backends run
 //! the same machine, the CPU in a loop, the GPU one step a dispatch.

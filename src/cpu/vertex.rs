@@ -1,4 +1,4 @@
-//! One vertex of any path: emission, next event, cone direction, continuation. WGSL twin: `shaders/vertex.wgsl`.
+//! One vertex of any path: emission, next event, cone direction, continuation. WGSL twin: `shaders/cpu/vertex.wgsl`.
 
 use glam::Vec3;
 

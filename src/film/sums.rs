@@ -1,4 +1,4 @@
-//! Per-pixel sums in double-float arithmetic. Twin of `shaders/film.wgsl`.
+//! Per-pixel sums in double-float arithmetic. Twin of `shaders/film/sums.wgsl`.
 //!
 //! A double-float is a pair (hi, lo) of f32 whose exact sum is the value: about 46 bits, so that sample ranges rendered apart
 //! and merged agree with one run to the last bits of f32, and a million samples sum without drift (T. J. Dekker, "A
@@ -324,14 +324,14 @@ mod tests {
     /// Sizes and offsets of the WGSL structs, by naga's reflection, against the Rust records.
     #[test]
     fn records_have_the_layout_of_the_shader() {
-        let module = naga::front::wgsl::parse_str(include_str!("../../shaders/film.wgsl"))
-            .expect("film.wgsl parses");
+        let module = naga::front::wgsl::parse_str(include_str!("../../shaders/film/sums.wgsl"))
+            .expect("film/sums.wgsl parses");
         naga::valid::Validator::new(
             naga::valid::ValidationFlags::all(),
             naga::valid::Capabilities::empty(),
         )
         .validate(&module)
-        .expect("film.wgsl is valid");
+        .expect("film/sums.wgsl is valid");
         let layout = |name: &str| {
             module
                 .types
@@ -373,7 +373,7 @@ mod tests {
         const STEPS: u32 = 300;
         let probe = Probe {
             features: Features::default(),
-            prelude: "import package::film::{PixelSums, pixel_add, pixel_add_real};
+            prelude: "import package::film::sums::{PixelSums, pixel_add, pixel_add_real};
                 fn noise(i: u32) -> f32 {
                     var x = (i * 0x9e3779b9u) ^ 0x85ebca6bu;
                     x = x ^ (x >> 16u);
@@ -410,9 +410,13 @@ mod tests {
             scene: None,
         };
         let inputs: Vec<u32> = (0..64).flat_map(|record| [record, 0]).collect();
-        let film = include_str!("../../shaders/film.wgsl");
+        let film = include_str!("../../shaders/film/sums.wgsl");
         let outputs = probe
-            .run_with(gpu, Composer::default().with_module("film", film), &inputs)
+            .run_with(
+                gpu,
+                Composer::default().with_module("film::sums", film),
+                &inputs,
+            )
             .expect("the probe runs");
         let host = |record: u32, nudge: u32| -> Vec<u32> {
             let mut sums = PixelSums::default();

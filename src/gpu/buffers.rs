@@ -1,4 +1,4 @@
-//! The packed scene in storage buffers: bind group 0 of every kernel, as `shaders/bindings.wgsl` declares it.
+//! The packed scene in storage buffers: bind group 0 of every kernel, as `shaders/packed/bindings.wgsl` declares it.
 
 use bytemuck::Zeroable;
 

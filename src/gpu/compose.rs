@@ -1,6 +1,6 @@
 //! Composes shaders: the embedded modules of `shaders/`, WESL imports and `@if(feature)`, unused declarations left out.
 //!
-//! Names of imported items become `module_item`, so `package::math::hash_u32` is `math_hash_u32` in the emitted WGSL.
+//! Names of imported items carry their module: `package::light::cones::cone_pdf` is `light_cones_cone_pdf` in the emitted WGSL.
 
 use std::borrow::Cow;
 
@@ -9,64 +9,8 @@ use wesl::{CompileOptions, Feature, Mangler, ModulePath, VirtualResolver, Wesl};
 use super::GpuError;
 use crate::packed::{self, PackedScene};
 
-/// The embedded modules: name and source.
-pub const MODULES: &[(&str, &str)] = &[
-    ("bindings", include_str!("../../shaders/bindings.wgsl")),
-    ("bsdf", include_str!("../../shaders/bsdf.wgsl")),
-    ("cones", include_str!("../../shaders/cones.wgsl")),
-    (
-        "contribution",
-        include_str!("../../shaders/contribution.wgsl"),
-    ),
-    (
-        "environment",
-        include_str!("../../shaders/environment.wgsl"),
-    ),
-    ("estimator", include_str!("../../shaders/estimator.wgsl")),
-    ("film", include_str!("../../shaders/film.wgsl")),
-    ("fresnel", include_str!("../../shaders/fresnel.wgsl")),
-    ("ggx", include_str!("../../shaders/ggx.wgsl")),
-    ("kernels", include_str!("../../shaders/kernels.wgsl")),
-    ("lanes", include_str!("../../shaders/lanes.wgsl")),
-    ("lens", include_str!("../../shaders/lens.wgsl")),
-    ("lights", include_str!("../../shaders/lights.wgsl")),
-    ("lobes", include_str!("../../shaders/lobes.wgsl")),
-    ("math", include_str!("../../shaders/math.wgsl")),
-    ("normal", include_str!("../../shaders/normal.wgsl")),
-    ("rectangle", include_str!("../../shaders/rectangle.wgsl")),
-    ("request", include_str!("../../shaders/request.wgsl")),
-    ("sampler", include_str!("../../shaders/sampler.wgsl")),
-    ("shutter", include_str!("../../shaders/shutter.wgsl")),
-    ("state", include_str!("../../shaders/state.wgsl")),
-    (
-        "stages_antialias",
-        include_str!("../../shaders/stages_antialias.wgsl"),
-    ),
-    (
-        "stages_cartoon",
-        include_str!("../../shaders/stages_cartoon.wgsl"),
-    ),
-    (
-        "stages_copies",
-        include_str!("../../shaders/stages_copies.wgsl"),
-    ),
-    (
-        "stages_curve",
-        include_str!("../../shaders/stages_curve.wgsl"),
-    ),
-    (
-        "stages_flow",
-        include_str!("../../shaders/stages_flow.wgsl"),
-    ),
-    (
-        "stages_noise",
-        include_str!("../../shaders/stages_noise.wgsl"),
-    ),
-    ("surface", include_str!("../../shaders/surface.wgsl")),
-    ("texture", include_str!("../../shaders/texture.wgsl")),
-    ("trace", include_str!("../../shaders/trace.wgsl")),
-    ("vertex", include_str!("../../shaders/vertex.wgsl")),
-];
+/// The embedded modules, one a file of `shaders/`: name and source.
+pub const MODULES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/shader_modules.rs"));
 
 macro_rules! features {
     ($($(#[$doc:meta])* $name:ident,)*) => {
@@ -173,15 +117,14 @@ impl Features {
     }
 }
 
-/// `package::math::hash_u32` -> `math_hash_u32`.
+/// `package::light::cones::cone_pdf` -> `light_cones_cone_pdf`.
 struct ModuleItemMangler;
 
 impl Mangler for ModuleItemMangler {
     fn mangle(&self, path: &ModulePath, item: &str) -> String {
-        match path.components.last() {
-            Some(module) => format!("{module}_{item}"),
-            None => item.to_owned(),
-        }
+        let mut words = path.components.clone();
+        words.push(item.to_owned());
+        words.join("_")
     }
 }
 
@@ -202,7 +145,7 @@ impl Default for Composer {
 }
 
 impl Composer {
-    /// Adds the module `package::NAME`, in place of the embedded one of that name if there is one.
+    /// Adds the module `package::NAME` (which may be a path: `light::cones`), in place of the embedded one of that name if there is one.
     pub fn with_module(mut self, name: &str, source: impl Into<Cow<'static, str>>) -> Self {
         self.modules.retain(|(present, _)| present != name);
         self.modules.push((name.to_owned(), source.into()));
@@ -274,7 +217,7 @@ mod tests {
     use super::*;
 
     const ROOT: &str = "
-import package::bindings::{frame, lights, NONE};
+import package::packed::bindings::{frame, lights, NONE};
 import package::extra::helper;
 @if(lens) fn radius() -> f32 { return frame.aperture_radius; }
 @else fn radius() -> f32 { return 0.0; }
@@ -309,13 +252,17 @@ fn unused() -> u32 { return lights[0].kind; }
             ..Features::default()
         };
         let first = compose("first", &lens);
-        assert_eq!(binding_names(&first), ["bindings_frame"], "{first}");
+        assert_eq!(binding_names(&first), ["packed_bindings_frame"], "{first}");
         assert!(
             first.contains("extra_helper") && !first.contains("second"),
             "{first}"
         );
         let second = compose("second", &lens);
-        assert_eq!(binding_names(&second), ["bindings_lights"], "{second}");
+        assert_eq!(
+            binding_names(&second),
+            ["packed_bindings_lights"],
+            "{second}"
+        );
     }
 
     #[test]

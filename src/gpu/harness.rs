@@ -203,7 +203,7 @@ mod tests {
         let scene = SceneBuffers::from_parts(gpu, &parts).expect("uploads");
         let mut probe = Probe {
             features: Features::default(),
-            prelude: "import package::bindings::{frame, triangles};",
+            prelude: "import package::packed::bindings::{frame, triangles};",
             body: "output(0u, triangles[input(0u)].material); output(1u, frame.width);",
             input_words: 1,
             output_words: 2,

@@ -1,4 +1,4 @@
-//! The buffers of a batch of samples in flight: bind group 1, as `shaders/lanes.wgsl` declares it.
+//! The buffers of a batch of samples in flight: bind group 1, as `shaders/gpu/lanes.wgsl` declares it.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -138,7 +138,7 @@ fn host() -> Vec<(&'static str, u32, Fields)> {
 }
 
 fn bindings_module() -> (naga::Module, naga::proc::Layouter) {
-    let source = include_str!("../../shaders/bindings.wgsl");
+    let source = include_str!("../../shaders/packed/bindings.wgsl");
     let module = naga::front::wgsl::parse_str(source).expect("bindings.wgsl is plain WGSL");
     let mut layouter = naga::proc::Layouter::default();
     layouter.update(module.to_ctx()).expect("layout");

@@ -24,7 +24,7 @@ fn variants() -> Vec<Features> {
 /// If naga, with no capability beyond the standard's, objects.
 fn valid(composer: &Composer, kernel: &str, features: &Features) -> String {
     let wgsl = composer
-        .compose("kernels", kernel, features)
+        .compose("gpu::kernels", kernel, features)
         .unwrap_or_else(|error| panic!("{features:?}: {error}"));
     let module = naga::front::wgsl::parse_str(&wgsl)
         .unwrap_or_else(|error| panic!("{features:?}: {}", error.emit_to_string(&wgsl)));
@@ -61,15 +61,15 @@ fn kernels_bind_what_they_use_and_no_more() {
     let composer = Composer::default();
     let set = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
     let turn = bound(&composer, "kernel_turn", &Features::all());
-    assert_eq!(turn, set(&["lanes_counters", "lanes_indirect"]));
+    assert_eq!(turn, set(&["gpu_lanes_counters", "gpu_lanes_indirect"]));
     let accumulate: BTreeSet<String> = set(&[
-        "bindings_frame",
-        "lanes_batch",
-        "lanes_counters",
-        "lanes_guide_sums",
-        "lanes_paths",
-        "lanes_pixel_sums",
-        "lanes_work",
+        "packed_bindings_frame",
+        "gpu_lanes_batch",
+        "gpu_lanes_counters",
+        "gpu_lanes_guide_sums",
+        "gpu_lanes_paths",
+        "gpu_lanes_pixel_sums",
+        "gpu_lanes_work",
     ]);
     assert_eq!(
         bound(&composer, "kernel_accumulate", &Features::all()),
@@ -102,25 +102,25 @@ const TRACES: &[Trace] = &[
     Trace {
         feature: "textures",
         with: &[
-            "bindings_texels",
-            "fn texture_slot",
-            "fn texture_texture_sample",
+            "packed_bindings_texels",
+            "fn material_texture_slot",
+            "fn material_texture_texture_sample",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "alpha",
-        with: &["fn surface_coverage_of"],
+        with: &["fn material_surface_coverage_of"],
         ..ADVANCE
     },
     Trace {
         feature: "alpha",
         kernel: "kernel_trace",
         with: &[
-            "bindings_materials",
-            "bindings_vertices",
-            "fn request_meets",
-            "fn surface_surface_alpha",
+            "packed_bindings_materials",
+            "packed_bindings_vertices",
+            "fn cpu_request_meets",
+            "fn material_surface_surface_alpha",
         ],
         ..ADVANCE
     },
@@ -132,17 +132,17 @@ const TRACES: &[Trace] = &[
     Trace {
         feature: "transmission",
         with: &[
-            "fn bsdf_eval_transmission",
-            "fn bsdf_transmit_straight",
-            "fn ggx_ggx_refract",
-            "fn fresnel_refract_about",
+            "fn material_bsdf_eval_transmission",
+            "fn material_bsdf_transmit_straight",
+            "fn material_ggx_ggx_refract",
+            "fn material_fresnel_refract_about",
         ],
         beside: &["rough_specular"],
         ..ADVANCE
     },
     Trace {
         feature: "clearcoat",
-        with: &["fn bsdf_sample_coat"],
+        with: &["fn material_bsdf_sample_coat"],
         beside: &["rough_specular"],
         ..ADVANCE
     },
@@ -155,69 +155,75 @@ const TRACES: &[Trace] = &[
     Trace {
         feature: "environment_map",
         with: &[
-            "bindings_env_cdf",
-            "bindings_env_texels",
-            "fn environment_env_sample_map",
-            "fn environment_find_interval",
+            "packed_bindings_env_cdf",
+            "packed_bindings_env_texels",
+            "fn light_environment_env_sample_map",
+            "fn light_environment_find_interval",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "area_lights",
         with: &[
-            "fn lights_sample_area_light",
-            "fn lights_light_pdf_hit",
-            "fn rectangle_",
-            "fn surface_triangle_emission",
+            "fn light_lights_sample_area_light",
+            "fn light_lights_light_pdf_hit",
+            "fn light_rectangle_",
+            "fn material_surface_triangle_emission",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "delta_lights",
-        with: &["fn lights_sample_point_light", "fn lights_spot_falloff"],
+        with: &[
+            "fn light_lights_sample_point_light",
+            "fn light_lights_spot_falloff",
+        ],
         ..ADVANCE
     },
     Trace {
         feature: "lens",
         kernel: "kernel_generate",
         with: &[
-            "fn lens_sample_lens",
-            "bindings_frame.aperture_radius",
-            "bindings_frame.inv_focus_distance",
+            "fn camera_lens_sample_lens",
+            "packed_bindings_frame.aperture_radius",
+            "packed_bindings_frame.inv_focus_distance",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "multi_bounce",
-        with: &["vertex_ROULETTE_GAIN", "vertex_ROULETTE_FROM_DEPTH"],
+        with: &["cpu_vertex_ROULETTE_GAIN", "cpu_vertex_ROULETTE_FROM_DEPTH"],
         ..ADVANCE
     },
     Trace {
         feature: "photo_albedo",
-        with: &["bindings_photo_albedo", "fn surface_photo_albedo_at"],
+        with: &[
+            "packed_bindings_photo_albedo",
+            "fn material_surface_photo_albedo_at",
+        ],
         ..ADVANCE
     },
     Trace {
         feature: "normal_maps",
         with: &[
-            "fn surface_perturbed",
-            "fn normal_mapped_normal",
-            "fn normal_tangent_from_uv",
+            "fn material_surface_perturbed",
+            "fn material_normal_mapped_normal",
+            "fn material_normal_tangent_from_uv",
         ],
         beside: &["textures"],
         ..ADVANCE
     },
     Trace {
         feature: "paper",
-        with: &["fn estimator_paper_behind", ".radiance_real"],
+        with: &["fn cpu_estimator_paper_behind", ".radiance_real"],
         without: &[
-            "fn estimator_primary_virtual",
-            "fn estimator_difference_shadow",
-            "fn estimator_difference_cone",
-            "fn estimator_difference_bsdf",
-            "fn estimator_split_difference",
-            "fn vertex_plan_cone",
-            "fn cones_",
+            "fn cpu_estimator_primary_virtual",
+            "fn cpu_estimator_difference_shadow",
+            "fn cpu_estimator_difference_cone",
+            "fn cpu_estimator_difference_bsdf",
+            "fn cpu_estimator_split_difference",
+            "fn cpu_vertex_plan_cone",
+            "fn light_cones_",
         ],
         ..ADVANCE
     },
@@ -231,19 +237,19 @@ const TRACES: &[Trace] = &[
         feature: "shutter",
         kernel: "kernel_generate",
         with: &[
-            "fn shutter_shutter_share",
-            "fn shutter_camera_pose_at",
-            "bindings_frame.shutter_poses",
+            "fn camera_shutter_shutter_share",
+            "fn camera_shutter_camera_pose_at",
+            "packed_bindings_frame.shutter_poses",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "rough_specular",
         with: &[
-            "fn ggx_",
-            "fn bsdf_sample_layers",
-            "fn bsdf_eval_reflection",
-            "fn normal_valid_shading_normal",
+            "fn material_ggx_",
+            "fn material_bsdf_sample_layers",
+            "fn material_bsdf_eval_reflection",
+            "fn material_normal_valid_shading_normal",
         ],
         ..ADVANCE
     },
@@ -298,10 +304,10 @@ fn one_bounce_has_no_recursion() {
         };
         let wgsl = valid(&Composer::default(), "kernel_advance", &features);
         let (_, rest) = wgsl
-            .split_once("fn estimator_difference_bsdf")
+            .split_once("fn cpu_estimator_difference_bsdf")
             .expect("is there");
         let (body, _) = rest.split_once("\nfn ").unwrap_or((rest, ""));
-        body.matches("estimator_plan_vertex(").count()
+        body.matches("cpu_estimator_plan_vertex(").count()
     };
     assert_eq!((plans(true), plans(false)), (1, 0));
 }
@@ -310,8 +316,8 @@ fn one_bounce_has_no_recursion() {
 #[should_panic(expected = "no definition in scope")]
 fn an_invalid_variant_is_noticed() {
     let broken = Composer::default().with_module(
-        "request",
-        "import package::state::PathState;
+        "cpu::request",
+        "import package::cpu::state::PathState;
         fn answer(path: ptr<function, PathState>, thread: u32) { @if(clearcoat) { _ = not_there(thread); } }",
     );
     valid(&broken, "kernel_trace", &Features::all());

@@ -83,7 +83,7 @@ fn compile(
     KERNELS
         .iter()
         .map(|entry_point| {
-            let wgsl = composer.compose("kernels", entry_point, features)?;
+            let wgsl = composer.compose("gpu::kernels", entry_point, features)?;
             Kernel::new(gpu, entry_point, &wgsl)
         })
         .collect()

@@ -24,8 +24,8 @@ struct PathState {
 
 /// A walk that ends at each step with probability 1/8; what it 'hits' is a hash of where it is.
 const ESTIMATOR: &str = "
-import package::bindings::frame;
-import package::state::{PathState, STAGE_DONE};
+import package::packed::bindings::frame;
+import package::cpu::state::{PathState, STAGE_DONE};
 import package::toy::mix_bits;
 fn begin_sample(pixel: u32, index: u32, real_pass: bool) -> PathState {
     var path: PathState;
@@ -48,7 +48,7 @@ fn advance(path: ptr<function, PathState>) {
 }";
 
 const REQUEST: &str = "
-import package::state::PathState;
+import package::cpu::state::PathState;
 import package::toy::mix_bits;
 fn answer(path: ptr<function, PathState>, thread: u32) {
     (*path).hit_real = mix_bits((*path).word ^ (*path).stage);
@@ -59,9 +59,9 @@ const TOY: &str = "fn mix_bits(word: u32) -> u32 { var x = word; x ^= x >> 16u; 
 
 pub(super) fn composer() -> Composer {
     Composer::default()
-        .with_module("state", STATE)
-        .with_module("estimator", ESTIMATOR)
-        .with_module("request", REQUEST)
+        .with_module("cpu::state", STATE)
+        .with_module("cpu::estimator", ESTIMATOR)
+        .with_module("cpu::request", REQUEST)
         .with_module("toy", TOY)
 }
 

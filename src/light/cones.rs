@@ -1,4 +1,4 @@
-//! The cones in which the virtual geometry's bounding spheres are seen from a point. WGSL twin: `shaders/cones.wgsl`.
+//! The cones in which the virtual geometry's bounding spheres are seen from a point. WGSL twin: `shaders/light/cones.wgsl`.
 //!
 //! A direction that meets virtual geometry lies in at least one cone, so a mixture of uniform distributions over the cones covers all of (b) in
 //! docs/estimator.md. A sphere that subtends a wide cone, or contains the point, is replaced by the cosine-weighted hemisphere.

@@ -1,4 +1,4 @@
-//! The distant environment: a latitude-longitude map or a constant. WGSL twin: `shaders/environment.wgsl`.
+//! The distant environment: a latitude-longitude map or a constant. WGSL twin: `shaders/light/environment.wgsl`.
 //!
 //! The map is bilinear between texel centres, wraps in u and is constant beyond the first and last row of centres. It is sampled by cells, the
 //! rectangles between neighbouring centres: column i lies between the centres of texels i and i + 1, row j between those of j - 1 and j. A cell

@@ -1,4 +1,4 @@
-//! Choosing a light and a point on it. WGSL twin: `shaders/lights.wgsl`.
+//! Choosing a light and a point on it. WGSL twin: `shaders/light/lights.wgsl`.
 
 use glam::Vec3;
 

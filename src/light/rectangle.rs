@@ -1,5 +1,5 @@
 //! Rectangular lights by solid angle, after Ureña, Fajardo and King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013,
-//! in a form without their differences of nearly equal angles. WGSL twin: `shaders/rectangle.wgsl`.
+//! in a form without their differences of nearly equal angles. WGSL twin: `shaders/light/rectangle.wgsl`.
 
 use std::f32::consts::PI;
 

@@ -1,6 +1,6 @@
 //! The scene as both backends read it: flat arrays of plain records, f32, positions relative to an anchor near the camera.
 //!
-//! Every record here has a WGSL struct of the same name and field order in `shaders/bindings.wgsl`; a test compares the two by reflection.
+//! Every record here has a WGSL struct of the same name and field order in `shaders/packed/bindings.wgsl`; a test compares the two by reflection.
 //! Triangle ids are global: real triangles come first (`0..Frame::real_triangle_count`), virtual ones after.
 
 mod build;

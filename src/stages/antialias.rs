@@ -2,7 +2,7 @@
 //!
 //! J. Fischer, D. Bartz: Handling Photographic Imperfections and Aliasing in Augmented Reality (WSI-2006-03), section 4, its equations 9
 //! and 10: b = (v + sum of the real ones among the 3 x 3 neighbours) / (1 + their number), and beta b + (1 - beta) v is shown. In linear
-//! light. The twin for the GPU is `shaders/stages_antialias.wgsl`.
+//! light. The twin for the GPU is `shaders/stages/antialias.wgsl`.
 
 use rayon::prelude::*;
 

@@ -3,7 +3,7 @@
 //!
 //! J. Fischer, D. Bartz: Handling Photographic Imperfections and Aliasing in Augmented Reality (WSI-2006-03), section 5, its equations 11 and
 //! 12. Where k of n copies cover a pixel their opacity is 1 - (1 - 1/n)^k. In linear light; for several objects, the farthest first. The twin
-//! for the GPU is `shaders/stages_copies.wgsl`.
+//! for the GPU is `shaders/stages/copies.wgsl`.
 
 use rayon::prelude::*;
 

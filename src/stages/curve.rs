@@ -1,4 +1,4 @@
-//! The sRGB curve in f32, with the polynomials that both backends share. Twin of `shaders/stages_curve.wgsl`.
+//! The sRGB curve in f32, with the polynomials that both backends share. Twin of `shaders/stages/curve.wgsl`.
 
 use crate::math::{exp_, log_};
 

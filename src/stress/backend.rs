@@ -190,7 +190,7 @@ pub(crate) fn traced_by_shader(
     );
     let probe = Probe {
         features: Features::default(),
-        prelude: "import package::trace::{trace, Ray, Hit};",
+        prelude: "import package::accel::trace::{trace, Ray, Hit};",
         body: &body,
         input_words: 10,
         output_words: 4,

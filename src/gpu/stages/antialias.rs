@@ -1,4 +1,4 @@
-//! Host side of `shaders/stages_antialias.wgsl`.
+//! Host side of `shaders/stages/antialias.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 

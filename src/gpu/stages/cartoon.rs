@@ -1,4 +1,4 @@
-//! Host side of `shaders/stages_cartoon.wgsl` and `shaders/stages_flow.wgsl`.
+//! Host side of `shaders/stages/cartoon/mod.wgsl` and `shaders/stages/cartoon/flow.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 

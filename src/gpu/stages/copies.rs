@@ -1,4 +1,4 @@
-//! Host side of `shaders/stages_copies.wgsl`.
+//! Host side of `shaders/stages/copies.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -20,20 +20,20 @@ const TILE: u32 = 8;
 
 /// Every kernel of the stages: module and entry point.
 pub const STAGE_KERNELS: &[(&str, &str)] = &[
-    ("stages_antialias", "stage_antialias"),
-    ("stages_cartoon", "stage_shrink"),
-    ("stages_cartoon", "stage_filter"),
-    ("stages_cartoon", "stage_respond"),
-    ("stages_cartoon", "stage_compose"),
-    ("stages_copies", "stage_copies"),
-    ("stages_flow", "stage_tensor"),
-    ("stages_flow", "stage_blur_rows"),
-    ("stages_flow", "stage_blur_columns"),
-    ("stages_flow", "stage_across"),
-    ("stages_flow", "stage_along"),
-    ("stages_noise", "stage_white"),
-    ("stages_noise", "stage_missing"),
-    ("stages_noise", "stage_textures"),
+    ("stages::antialias", "stage_antialias"),
+    ("stages::cartoon", "stage_shrink"),
+    ("stages::cartoon", "stage_filter"),
+    ("stages::cartoon", "stage_respond"),
+    ("stages::cartoon", "stage_compose"),
+    ("stages::copies", "stage_copies"),
+    ("stages::cartoon::flow", "stage_tensor"),
+    ("stages::cartoon::flow", "stage_blur_rows"),
+    ("stages::cartoon::flow", "stage_blur_columns"),
+    ("stages::cartoon::flow", "stage_across"),
+    ("stages::cartoon::flow", "stage_along"),
+    ("stages::noise", "stage_white"),
+    ("stages::noise", "stage_missing"),
+    ("stages::noise", "stage_textures"),
 ];
 
 /// The stages on one device.

@@ -1,4 +1,4 @@
-//! Host side of `shaders/stages_noise.wgsl`.
+//! Host side of `shaders/stages/noise/mod.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -99,12 +99,12 @@ fn profile() -> NoiseProfile {
 #[test]
 fn every_kernel_is_valid_and_its_params_are_the_hosts() {
     let sizes = [
-        ("stages_antialias", 0, size_of::<AntialiasParams>()),
-        ("stages_cartoon", 0, size_of::<CartoonParams>()),
-        ("stages_copies", 0, size_of::<CopiesParams>()),
-        ("stages_flow", 0, size_of::<CartoonParams>()),
-        ("stages_flow", 1, size_of::<FlowParams>()),
-        ("stages_noise", 0, size_of::<NoiseParams>()),
+        ("stages::antialias", 0, size_of::<AntialiasParams>()),
+        ("stages::cartoon", 0, size_of::<CartoonParams>()),
+        ("stages::copies", 0, size_of::<CopiesParams>()),
+        ("stages::cartoon::flow", 0, size_of::<CartoonParams>()),
+        ("stages::cartoon::flow", 1, size_of::<FlowParams>()),
+        ("stages::noise", 0, size_of::<NoiseParams>()),
     ];
     for (module, kernel) in STAGE_KERNELS {
         let wgsl = Composer::default()

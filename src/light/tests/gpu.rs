@@ -1,4 +1,4 @@
-//! `shaders/lights.wgsl`, `environment.wgsl` and `cones.wgsl` against their Rust twins.
+//! `shaders/light/lights.wgsl`, `environment.wgsl` and `cones.wgsl` against their Rust twins.
 
 use glam::Vec3;
 
@@ -33,9 +33,9 @@ output_f32(18u, select(0.0, 1.0, direction_meets_spheres(position, direction)));
 output_f32(19u, light_pdf_hit(light_select(u.x, u.w), position, s.direction, s.distance));
 ";
 const PRELUDE: &str = "
-import package::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
-import package::environment::env_radiance;
-import package::lights::{env_arriving, light_pdf_hit, light_sample, light_select};
+import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
+import package::light::environment::env_radiance;
+import package::light::lights::{env_arriving, light_pdf_hit, light_sample, light_select};
 ";
 const OUTPUTS: usize = 20;
 

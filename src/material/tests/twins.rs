@@ -104,9 +104,9 @@ fn scattering_inputs(count: usize) -> Vec<(Surface, Vec3, Vec3, [f32; 3])> {
 }
 
 const PRELUDE: &str = "
-import package::bindings::NONE;
-import package::bsdf::{bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_is_delta, bsdf_sample};
-import package::surface::Surface;
+import package::packed::bindings::NONE;
+import package::material::bsdf::{bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_is_delta, bsdf_sample};
+import package::material::surface::Surface;
 ";
 
 fn run(
@@ -230,8 +230,7 @@ fn textures_agree_with_their_twin() {
         ..SceneParts::default()
     };
     let scene = SceneBuffers::from_parts(gpu, &parts).expect("uploads");
-    let prelude =
-        "import package::bindings::texture_refs; import package::texture::texture_sample;";
+    let prelude = "import package::packed::bindings::texture_refs; import package::material::texture::texture_sample;";
     let body =
         "let c = texture_sample(texture_refs[input(0u)], vec2<f32>(input_f32(1u), input_f32(2u)));
         output_vec3(0u, c.xyz); output_f32(3u, c.w);";
@@ -294,8 +293,7 @@ fn shading_points_agree_with_their_twin() {
                 .chain(d.to_array().map(f32::to_bits))
         })
         .collect();
-    let prelude =
-        "import package::surface::{surface_alpha, surface_at}; import package::trace::Hit;";
+    let prelude = "import package::material::surface::{surface_alpha, surface_at}; import package::accel::trace::Hit;";
     let body = "let hit = Hit(1.0, input_f32(0u), input_f32(1u), input(2u)); let s = surface_at(hit, input_vec3(3u));
         output_vec3(0u, s.position); output_vec3(3u, s.ng); output_vec3(6u, s.ns); output_vec3(9u, s.coat_ns);
         output_vec3(12u, s.base_color); output_vec3(15u, s.emission); output_vec3(18u, s.specular_color);
@@ -355,9 +353,9 @@ fn shading_points_agree_with_their_twin() {
 #[test]
 fn features_that_are_off_leave_the_materials() {
     const ROOT: &str = "
-import package::bsdf::{bsdf_albedo, bsdf_eval, bsdf_sample};
-import package::surface::{surface_alpha, surface_at};
-import package::trace::Hit;
+import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_sample};
+import package::material::surface::{surface_alpha, surface_at};
+import package::accel::trace::Hit;
 @group(1) @binding(0) var<storage, read_write> out: array<vec4<f32>>;
 @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let hit = Hit(1.0, 0.25, 0.25, id.x);
@@ -374,19 +372,26 @@ import package::trace::Hit;
             .expect("composes")
     };
     let traces: [(&str, &[&str]); 7] = [
-        ("textures", &["texture_texture_sample", "bindings_texels"]),
-        ("normal_maps", &["normal_mapped_normal"]),
+        (
+            "textures",
+            &["material_texture_texture_sample", "packed_bindings_texels"],
+        ),
+        ("normal_maps", &["material_normal_mapped_normal"]),
         (
             "transmission",
-            &["ggx_ggx_refract", "fresnel_refract_about"],
+            &["material_ggx_ggx_refract", "material_fresnel_refract_about"],
         ),
-        ("clearcoat", &["bsdf_sample_coat"]),
+        ("clearcoat", &["material_bsdf_sample_coat"]),
         (
             "rough_specular",
-            &["lobes_lobes_at", "ggx_ggx_d", "normal_valid_shading_normal"],
+            &[
+                "material_lobes_lobes_at",
+                "material_ggx_ggx_d",
+                "material_normal_valid_shading_normal",
+            ],
         ),
-        ("photo_albedo", &["surface_photo_albedo_at"]),
-        ("alpha", &["surface_coverage_of"]),
+        ("photo_albedo", &["material_surface_photo_albedo_at"]),
+        ("alpha", &["material_surface_coverage_of"]),
     ];
     let all = compose(&Features::all());
     for (feature, names) in traces {

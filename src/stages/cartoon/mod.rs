@@ -9,7 +9,7 @@
 //!
 //! Everything is done on encoded sRGB values in 0..=1 and BT.601 YUV. Where the paper leaves it open: borders repeat, Sobel sums are
 //! divided by 4, pixel centres lie at halves, and the enlarged colours and responses are interpolated linearly. The twin for the GPU is
-//! `shaders/stages_cartoon.wgsl`.
+//! `shaders/stages/cartoon/mod.wgsl`.
 
 mod edges;
 mod flow;

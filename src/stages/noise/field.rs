@@ -1,5 +1,5 @@
 //! Normal deviates for every pixel of every frame, drawn by hash and correlated as the camera's noise is. Twin of
-//! `shaders/stages_noise.wgsl`.
+//! `shaders/stages/noise/mod.wgsl`.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! How much noise a pixel lacks. Twin of `shaders/stages_noise.wgsl`.
+//! How much noise a pixel lacks. Twin of `shaders/stages/noise/mod.wgsl`.
 
 use super::BIN_SHIFT;
 use crate::scene::NoiseProfile;

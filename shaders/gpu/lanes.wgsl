@@ -1,7 +1,7 @@
 // A batch of samples in flight: one lane each, its state in `paths`, the lanes that still want a ray in a queue.
 
-import package::state::PathState;
-import package::film::{PixelSums, GuideSums};
+import package::cpu::state::PathState;
+import package::film::sums::{PixelSums, GuideSums};
 
 // Uniform of a batch; src/gpu/lanes.rs has its twin.
 struct Batch {

@@ -1,8 +1,8 @@
 // What estimator and vertex share: random numbers of a decision, weights, accumulation. Rust twin: src/cpu/contribution.rs.
 
-import package::bindings::{frame, pixels};
-import package::sampler::{SampleKey, sample_4d};
-import package::state::{DELTA_DENSITY, MODE_REAL, MODE_SHARED, PathState};
+import package::packed::bindings::{frame, pixels};
+import package::camera::sampler::{SampleKey, sample_4d};
+import package::cpu::state::{DELTA_DENSITY, MODE_REAL, MODE_SHARED, PathState};
 
 const SET_DIFFERENCE_LIGHT: u32 = 0u;
 const SET_DIFFERENCE_BSDF: u32 = 1u;

@@ -1,25 +1,25 @@
 // The estimator as a state machine. Rust twin: src/cpu/estimator.rs, where the method is described.
 
-import package::bindings::{NONE, frame, pixels, FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PIXEL_BEAM_MAY_MEET_VIRTUAL};
-import package::bsdf::bsdf_albedo;
-import package::cones::cone_pdf;
-import package::contribution::{accumulate, density_weight, sample_key};
-import package::environment::env_radiance;
-import package::lens::camera_ray_from;
-import package::lights::env_arriving;
+import package::packed::bindings::{NONE, frame, pixels, FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PIXEL_BEAM_MAY_MEET_VIRTUAL};
+import package::material::bsdf::bsdf_albedo;
+import package::light::cones::cone_pdf;
+import package::cpu::contribution::{accumulate, density_weight, sample_key};
+import package::light::environment::env_radiance;
+import package::camera::lens::camera_ray_from;
+import package::light::lights::env_arriving;
 import package::math::{dot3, hash_combine, hash_u32};
-import package::sampler::sample_4d;
-import package::shutter::{camera_pose, camera_pose_at, shutter_share};
-import package::state::{
+import package::camera::sampler::sample_4d;
+import package::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
+import package::cpu::state::{
     COINCIDENCE, DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_REAL,
     PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_REAL,
     REQUEST_CLOSEST_VIRTUAL, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
     REQUEST_VIRTUAL_THEN_REAL, STAGE_DIFFERENCE_BSDF, STAGE_DIFFERENCE_CONE, STAGE_DIFFERENCE_SHADOW, STAGE_DONE,
     STAGE_PAPER_BEHIND, STAGE_PATH, STAGE_PATH_SHADOW, STAGE_PRIMARY_REAL, STAGE_PRIMARY_VIRTUAL, STAGE_REAL_PASS, miss, path_state,
 };
-import package::surface::{Surface, surface_at};
-import package::trace::Hit;
-import package::vertex::shade_vertex;
+import package::material::surface::{Surface, surface_at};
+import package::accel::trace::Hit;
+import package::cpu::vertex::shade_vertex;
 
 const TURN_SALT: u32 = 0x7f4a7c15u;
 

@@ -1,14 +1,14 @@
 // Answers a sample's ray request. Rust twin: src/cpu/request.rs.
 
-import package::bindings::{NONE, frame, materials, triangles, FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_MASK, MATERIAL_ALPHA_BLEND};
+import package::packed::bindings::{NONE, frame, materials, triangles, FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_MASK, MATERIAL_ALPHA_BLEND};
 import package::math::{dot3, hash_combine, length3, uniform_from_bits};
-import package::state::{
+import package::cpu::state::{
     COINCIDENCE, FAR, PathState, miss,
     REQUEST_CLOSEST_VIRTUAL, REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_EACH, REQUEST_VIRTUAL_THEN_REAL,
     REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_MIXED, REQUEST_SHADOW_REAL, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
 };
-import package::trace::{Hit, Ray, trace};
-@if(alpha) import package::surface::surface_alpha;
+import package::accel::trace::{Hit, Ray, trace};
+@if(alpha) import package::material::surface::surface_alpha;
 
 const MAX_ALPHA_LAYERS: u32 = 64u;
 const WORLD_REAL: u32 = 0u;

@@ -1,7 +1,7 @@
 // Twin of src/stages/noise/{field,missing,textures}.rs: one thread a pixel.
 
 import package::math::{hash_combine, log_, sincos_2pi, uniform_from_bits};
-import package::stages_curve::{decode_, decode_slope, encode_};
+import package::stages::curve::{decode_, decode_slope, encode_};
 
 const MARGIN: u32 = 16u;
 const LAGS: u32 = 3u;

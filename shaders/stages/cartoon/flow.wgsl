@@ -1,6 +1,6 @@
 // Twin of src/stages/cartoon/flow.rs: one thread a pixel.
 
-import package::stages_cartoon::{image_gradients, params, smoothstep_, yuv_at};
+import package::stages::cartoon::{image_gradients, params, smoothstep_, yuv_at};
 
 struct FlowParams {
     // Weights of each half Gaussian stand in `weights`, one after the other: tensor, inner, outer, line.

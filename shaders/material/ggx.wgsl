@@ -1,7 +1,7 @@
 // Twin of src/material/ggx.rs: the same operations in the same order.
 
 import package::math::{dot3, orthonormal_basis, sincos_2pi};
-import package::normal::unit;
+import package::material::normal::unit;
 
 const MIN_COS: f32 = 1e-7;
 const INV_PI: f32 = 0.318309886;

@@ -1,15 +1,15 @@
 // The kernels of the wavefront: samples begin, ask for rays, are answered, and are summed. One step of a path a dispatch, so that no
 // invocation runs long and the lanes that are done make room.
 
-import package::bindings::frame;
-import package::estimator::{advance, begin_sample};
-import package::film::{guide_add, pixel_add, pixel_add_real};
-import package::lanes::{
+import package::packed::bindings::frame;
+import package::cpu::estimator::{advance, begin_sample};
+import package::film::sums::{guide_add, pixel_add, pixel_add_real};
+import package::gpu::lanes::{
     append, batch, counters, guide_sums, indirect, paths, pixel_sums, queue_in, work,
     COUNT_IN, COUNT_OUT, COUNT_RAYS, COUNT_STEPS, RAY_KINDS, WORKGROUP,
 };
-import package::request::answer;
-import package::state::{FAR, STAGE_DONE};
+import package::cpu::request::answer;
+import package::cpu::state::{FAR, STAGE_DONE};
 
 @compute @workgroup_size(64)
 fn kernel_generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {

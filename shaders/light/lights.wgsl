@@ -1,13 +1,13 @@
 // Choosing a light and a point on it. Rust twin: src/light/lights.rs.
 
-import package::bindings::{
+import package::packed::bindings::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE, frame, lights,
 };
-import package::environment::{env_evaluate, env_radiance, env_sample};
+import package::light::environment::{env_evaluate, env_radiance, env_sample};
 import package::math::{cross3, dot3, length3, safe_sqrt};
-import package::state::FAR;
-@if(area_lights) import package::rectangle::{rectangle_from, sample_rectangle};
-@if(area_lights) import package::surface::triangle_emission;
+import package::cpu::state::FAR;
+@if(area_lights) import package::light::rectangle::{rectangle_from, sample_rectangle};
+@if(area_lights) import package::material::surface::triangle_emission;
 
 struct LightSample {
     direction: vec3<f32>,

@@ -1,15 +1,15 @@
 // Twin of src/material/surface.rs: the same operations in the same order.
 
-import package::bindings::{
+import package::packed::bindings::{
     frame, materials, photo_albedo, texture_refs, triangles, vertices, Material, Vertex, NONE, TEXTURE_UV1,
     MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO, MATERIAL_QUAD_LIGHT,
     MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT
 };
-@if(photo_albedo) import package::lens::camera_project;
+@if(photo_albedo) import package::camera::lens::camera_project;
 import package::math::{cross3, dot3, safe_sqrt};
-import package::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
-import package::texture::{slot, slot_rgb, texture_sample};
-import package::trace::Hit;
+import package::material::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
+import package::material::texture::{slot, slot_rgb, texture_sample};
+import package::accel::trace::Hit;
 
 const GAMMA_7: f32 = 4.172327e-7;
 const BARYCENTRIC_ERROR: f32 = 1.1920929e-7;

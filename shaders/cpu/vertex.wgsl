@@ -1,22 +1,22 @@
 // One vertex of any path: emission, next event, cone direction, continuation. Rust twin: src/cpu/vertex.rs.
 
-import package::bindings::{
+import package::packed::bindings::{
     NONE, frame, materials, FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT,
     MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
 };
-import package::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample};
-import package::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
-import package::contribution::{accumulate, density_weight, draw};
-import package::contribution::{
+import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample};
+import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
+import package::cpu::contribution::{accumulate, density_weight, draw};
+import package::cpu::contribution::{
     SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
 };
-import package::lights::{LightSample, light_pdf_hit, light_sample, light_select};
+import package::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 import package::math::{dot3, exp_, safe_sqrt};
-import package::state::{
+import package::cpu::state::{
     COINCIDENCE, DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_SHADOW, PathState,
     REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED, REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL,
 };
-import package::surface::Surface;
+import package::material::surface::Surface;
 
 const ROULETTE_FROM_DEPTH: u32 = 2u;
 const ROULETTE_GAIN: f32 = 4.0;

@@ -1,8 +1,8 @@
 // Twin of the f32 half of src/camera/lens.rs: the same operations in the same order.
 
-import package::bindings::frame;
+import package::packed::bindings::frame;
 import package::math::{dot3, normalize3, sincos_2pi};
-import package::shutter::{CameraPose, camera_pose};
+import package::camera::shutter::{CameraPose, camera_pose};
 
 const APERTURE_DISC: u32 = 0u;
 const APERTURE_SQUARE: u32 = 1u;

@@ -1,7 +1,7 @@
 // The state of one sample in flight. Rust twin: src/cpu/state.rs.
 
-import package::bindings::NONE;
-import package::trace::Hit;
+import package::packed::bindings::NONE;
+import package::accel::trace::Hit;
 
 const STAGE_DONE: u32 = 0u;
 const STAGE_PRIMARY_VIRTUAL: u32 = 1u;
