@@ -92,8 +92,8 @@ pub fn render_pass(scene: &PackedScene, film: &mut Film, pass: Pass, cancel: &Ca
                             pixel_add_real(
                                 sums,
                                 index,
-                                st.mask != 0,
-                                st.radiance * scene.frame.exposure_scale,
+                                st.result.mask != 0,
+                                st.result.radiance * scene.frame.exposure_scale,
                             );
                         }
                     }
@@ -120,19 +120,19 @@ fn main_sample(
 ) {
     let st = run(scene, begin_sample(scene, pixel, index, false), counts);
     let scale = scene.frame.exposure_scale;
-    let is_virtual = st.mask != 0;
+    let is_virtual = st.result.mask != 0;
     let (contribution, real) = if scene.frame.estimator == ESTIMATOR_PAPER {
         let real = st.radiance_real * scale;
         (
             if is_virtual {
-                st.radiance * scale
+                st.result.radiance * scale
             } else {
-                (st.radiance - st.radiance_real) * scale
+                (st.result.radiance - st.radiance_real) * scale
             },
             Some(real),
         )
     } else {
-        (st.radiance * scale, None)
+        (st.result.radiance * scale, None)
     };
     sums.add(
         index,
@@ -144,19 +144,19 @@ fn main_sample(
         },
     );
     if let Some(sums) = guide
-        && st.depth_m.is_finite()
+        && st.first_hit.depth_m.is_finite()
     {
         let guide = Guide {
-            depth_m: st.depth_m,
-            normal: st.normal,
-            albedo: st.albedo,
+            depth_m: st.first_hit.depth_m,
+            normal: st.first_hit.normal,
+            albedo: st.first_hit.albedo,
         };
         guide_add(sums, guide.depth_m, guide.normal, guide.albedo);
     }
 }
 
 fn run(scene: &PackedScene, mut st: PathState, counts: &mut RayCounts64) -> PathState {
-    while st.stage != STAGE_DONE {
+    while st.path.stage != STAGE_DONE {
         answer(scene, &mut st);
         advance(scene, &mut st);
     }
@@ -171,7 +171,7 @@ pub fn render_first_hit(scene: &PackedScene, pixel: u32, index: u32) -> (Vec3, V
         begin_sample(scene, pixel, index, true),
         &mut RayCounts64::default(),
     );
-    (st.radiance, st.albedo)
+    (st.result.radiance, st.first_hit.albedo)
 }
 
 #[derive(Default)]

@@ -56,6 +56,8 @@ pub enum GpuError {
 #[cfg(test)]
 mod layout_test;
 #[cfg(test)]
+mod traffic_test;
+#[cfg(test)]
 mod variants_test;
 #[cfg(test)]
 mod wavefront_test;

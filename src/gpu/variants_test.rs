@@ -64,10 +64,11 @@ fn kernels_bind_what_they_use_and_no_more() {
     assert_eq!(turn, set(&["gpu_lanes_counters", "gpu_lanes_indirect"]));
     let accumulate: BTreeSet<String> = set(&[
         "packed_bindings_frame",
+        "cpu_state_path_first_hits",
+        "cpu_state_path_radiances_real",
+        "cpu_state_path_results",
         "gpu_lanes_batch",
-        "gpu_lanes_counters",
         "gpu_lanes_guide_sums",
-        "gpu_lanes_paths",
         "gpu_lanes_pixel_sums",
         "gpu_lanes_work",
     ]);
@@ -318,7 +319,7 @@ fn an_invalid_variant_is_noticed() {
     let broken = Composer::default().with_module(
         "cpu::request",
         "import package::cpu::state::PathState;
-        fn answer(path: ptr<function, PathState>, thread: u32) { @if(clearcoat) { _ = not_there(thread); } }",
+        fn answer(st: ptr<function, PathState>, thread: u32) { @if(clearcoat) { _ = not_there(thread); } }",
     );
     valid(&broken, "kernel_trace", &Features::all());
 }
