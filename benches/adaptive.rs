@@ -12,9 +12,9 @@ mod cpu_time;
 use std::path::{Path, PathBuf};
 
 use cpu_time::thread_cpu_secs;
+use mixray::bench::{replace_section, shrink};
 use mixray::film::{Picture, planes};
 use mixray::renderer::{Budget, ErrorGoal, Renderer, RendererOptions, Skip, Stated};
-use mixray::report::{replace_section, shrink};
 use mixray::scene::{BackendChoice, Scene};
 use rayon::prelude::*;
 

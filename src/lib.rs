@@ -20,6 +20,7 @@
 //! A backend knows no file format, and nothing below `cli` prints.
 
 pub mod accel;
+pub mod bench;
 pub mod camera;
 pub mod cli;
 pub mod cpu;
@@ -31,8 +32,7 @@ pub mod math;
 pub mod output;
 pub mod packed;
 pub mod renderer;
-pub mod report;
 pub mod scene;
 pub mod stages;
-pub mod stress;
+
 pub mod video;

@@ -1,10 +1,10 @@
-//! The quick cut of the stress test: every case on the CPU and on a graphics device, and every case's control. `mixray bench --stress` runs
+//! The quick cut of the stress test: every case on the CPU and on a graphics device, and every case's control. `mixray bench stress` runs
 //! the whole.
 
 use std::sync::Arc;
 
+use mixray::bench::stress::{Backend, Effort, cases};
 use mixray::gpu::harness::test_device;
-use mixray::stress::{Backend, Effort, cases};
 
 /// All that is wrong, so that one run shows it whole.
 fn failures(backend: &mut Backend) -> Vec<String> {

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use criterion::{Criterion, SamplingMode};
+use mixray::bench::shrink;
 use mixray::film::Picture;
 use mixray::renderer::{Budget, Renderer, RendererOptions};
-use mixray::report::shrink;
 use mixray::scene::{BackendChoice, Choice, Estimator, SamplerKind, load};
 
 use crate::processor_time::ProcessorTime;

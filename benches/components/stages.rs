@@ -11,7 +11,7 @@ use mixray::scene::{
 use mixray::stages::EncodedImage;
 use mixray::stages::antialias::antialias;
 use mixray::stages::cartoon::cartoon;
-use mixray::stages::copies::{Copies, draw_copies};
+use mixray::stages::motion_blur::{Copies, draw_copies};
 use mixray::stages::noise::{NoiseInput, NoiseStage};
 
 use crate::processor_time::ProcessorTime;

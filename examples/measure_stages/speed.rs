@@ -4,11 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use mixray::gpu::{AdapterChoice, GpuDevice, GpuStages};
+use mixray::gpu::{AdapterChoice, GpuDevice};
 use mixray::renderer::{Budget, Renderer, RendererOptions};
 use mixray::scene::{self, CartoonSettings, NoiseFit, NoiseProfile, NoiseSettings, Photo};
 use mixray::stages::cartoon::cartoon as stylise;
-use mixray::stages::{EncodedImage, finish};
+use mixray::stages::{EncodedImage, GpuStages, finish};
 
 use super::Result;
 

@@ -2,8 +2,8 @@ use glam::Vec3;
 
 use super::trace::Kernel;
 use super::*;
-use crate::stress::brute_force::*;
-use crate::stress::meshes::*;
+use crate::bench::stress::brute_force::*;
+use crate::bench::stress::meshes::*;
 
 fn kernels() -> Vec<Kernel> {
     Kernel::supported().collect()

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
+use super::values::unit;
 use super::{Failure, Outcome, print, say};
 use crate::output::{Target, check_distinct, write_composite};
 use crate::scene::AntialiasSettings;
@@ -26,13 +27,6 @@ pub(super) struct Arguments {
     beta: f32,
     #[command(flatten)]
     device: StageDevice,
-}
-
-fn unit(text: &str) -> Result<f32, &'static str> {
-    match text.parse::<f32>() {
-        Ok(x) if (0.0..=1.0).contains(&x) => Ok(x),
-        _ => Err("expected a number from 0 to 1"),
-    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {

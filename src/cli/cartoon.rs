@@ -7,6 +7,7 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 
 use super::stage_device::StageDevice;
+use super::values::{unit, within};
 use super::{Failure, Outcome, print, read_photo};
 use crate::output::{PngBits, Target, check_distinct, write_image};
 use crate::scene::{CartoonSettings, CartoonStyle, Choice};
@@ -69,20 +70,12 @@ fn size(text: &str) -> Result<(u32, u32), String> {
         .ok_or(format!("expected a size like 240x180, 1 to {most} a side"))
 }
 
-fn number(text: &str, accept: impl Fn(f32) -> bool) -> Option<f32> {
-    text.trim().parse().ok().filter(|x| accept(*x))
-}
-
 fn sigma(text: &str) -> Result<f32, &'static str> {
-    number(text, |x| (1e-4..=1e3).contains(&x)).ok_or("expected a number from 0.0001 to 1000")
-}
-
-fn unit(text: &str) -> Result<f32, &'static str> {
-    number(text, |x| (0.0..=1.0).contains(&x)).ok_or("expected a number from 0 to 1")
+    within(text, 1e-4, 1e3).ok_or("expected a number from 0.0001 to 1000")
 }
 
 fn step(text: &str) -> Result<(f32, f32), &'static str> {
-    let threshold = |text| number(text, |x| (0.0..=100.0).contains(&x));
+    let threshold = |text| within(text, 0.0, 100.0);
     text.split_once(',')
         .and_then(|(low, high)| Some((threshold(low)?, threshold(high)?)))
         .filter(|(low, high)| low < high)

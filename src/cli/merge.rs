@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use super::picture_flags::png_bits;
 use super::render::write;
+use super::values::png_bits;
 use super::{Failure, Outcome, print, say};
 use crate::film::Film;
 use crate::output::{FilmNote, PngBits, Target, check_distinct, read_film};
@@ -29,7 +28,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     scene: Option<PathBuf>,
     /// Bits a channel of PNG pictures [default: 16 for a 16-bit photograph, else 8]
-    #[arg(long, value_parser = PossibleValuesParser::new(["8", "16"]).map(png_bits))]
+    #[arg(long, value_parser = png_bits())]
     png_bits: Option<PngBits>,
     /// Frame number of a video: with [noise], every frame has its own
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -7,7 +7,6 @@ mod antialias;
 mod bench;
 mod cartoon;
 mod compare;
-mod growth;
 mod info;
 mod interrupt;
 mod layers;
@@ -19,8 +18,9 @@ mod progress;
 mod render;
 mod sequence;
 mod stage_device;
-mod stress;
 mod summary;
+mod threads;
+mod values;
 
 use std::io::Write;
 use std::path::Path;
@@ -76,7 +76,7 @@ pub fn run() -> ExitCode {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Sequence(arguments) => sequence::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
-        Command::Bench(arguments) => arguments.check().and_then(bench::run),
+        Command::Bench(arguments) => bench::run(arguments),
         Command::Cartoon(arguments) => cartoon::run(&arguments),
         Command::Noise(arguments) => noise::run(&arguments),
         Command::Antialias(arguments) => antialias::run(&arguments),

@@ -6,10 +6,11 @@ use clap::Args;
 
 use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
+use super::values::{unit, within};
 use super::{Failure, Outcome, print, say};
 use crate::output::{Target, check_distinct, write_composite};
 use crate::scene::MotionBlurSettings;
-use crate::stages::copies::{Copies, draw_copies};
+use crate::stages::motion_blur::{Copies, draw_copies};
 
 /// Puts a layer over a photograph, blurred along its motion by copies (Fischer and Bartz 2006, section 5)
 #[derive(Debug, Args)]
@@ -45,20 +46,12 @@ fn vector(text: &str) -> Result<[f32; 2], &'static str> {
         .ok_or("expected X,Y, two numbers of pixels")
 }
 
-fn within(text: &str, least: f32, most: f32) -> Option<f32> {
-    text.parse().ok().filter(|x| (least..=most).contains(x))
-}
-
 fn pixels(text: &str) -> Result<f32, &'static str> {
     within(text, 0.0, Copies::MAX_LENGTH_PX).ok_or("expected pixels from 0 to 4096")
 }
 
 fn step(text: &str) -> Result<f32, &'static str> {
     within(text, 0.1, 1000.0).ok_or("expected pixels from 0.1 to 1000")
-}
-
-fn unit(text: &str) -> Result<f32, &'static str> {
-    within(text, 0.0, 1.0).ok_or("expected a number from 0 to 1")
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {

@@ -8,6 +8,7 @@ use clap::{Args, Subcommand};
 
 use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
+use super::values::within;
 use super::{Failure, Outcome, print, progress, say};
 use crate::output::{Target, check_distinct, check_writable, write_composite, write_text};
 use crate::scene::{Choice, NoiseFit, NoiseMethod, NoiseProfile, NoiseSettings};
@@ -112,17 +113,11 @@ struct Apply {
 }
 
 fn factor(text: &str) -> Result<f32, &'static str> {
-    match text.parse::<f32>() {
-        Ok(x) if (0.0..=1000.0).contains(&x) => Ok(x),
-        _ => Err("expected a number from 0 to 1000"),
-    }
+    within(text, 0.0, 1000.0).ok_or("expected a number from 0 to 1000")
 }
 
 fn magnification(text: &str) -> Result<f32, &'static str> {
-    match text.parse::<f32>() {
-        Ok(x) if (0.01..=1000.0).contains(&x) => Ok(x),
-        _ => Err("expected a number from 0.01 to 1000"),
-    }
+    within(text, 0.01, 1000.0).ok_or("expected a number from 0.01 to 1000")
 }
 
 fn texture_size(text: &str) -> Result<u32, String> {

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::Failure;
-use super::render::choice;
+use super::threads::ThreadsFlag;
+use super::values::{choice, png_bits, rays_per_pixel};
 use crate::output::PngBits;
 use crate::renderer::{Skip, Without};
 use crate::scene::{BackendChoice, Composite, Estimator, Overrides, SamplerKind, Settings};
@@ -14,7 +14,7 @@ use crate::scene::{BackendChoice, Composite, Estimator, Overrides, SamplerKind, 
 #[derive(Debug, Args)]
 pub(super) struct PictureFlags {
     /// Primary rays for each pixel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_RAYS_PER_PIXEL)))]
+    #[arg(long, value_name = "N", value_parser = rays_per_pixel(1))]
     pub rpp: Option<u32>,
     /// Seed of all random numbers: the same seed gives the same picture; frame n of a sequence has the seed plus n
     #[arg(long, value_name = "N")]
@@ -37,14 +37,13 @@ pub(super) struct PictureFlags {
     #[arg(long, value_name = "NAME", value_parser = choice::<Skip>())]
     no_skip: Vec<Skip>,
     /// Bits a channel of PNG pictures [default: 16 where the photograph or frame has 16, else 8]
-    #[arg(long, value_parser = PossibleValuesParser::new(["8", "16"]).map(png_bits))]
+    #[arg(long, value_parser = png_bits())]
     pub png_bits: Option<PngBits>,
     /// Write times and counts as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
-    /// CPU threads [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
+    #[command(flatten)]
+    threads: ThreadsFlag,
 }
 
 impl PictureFlags {
@@ -68,23 +67,6 @@ impl PictureFlags {
 
     /// Once, before anything runs on several threads.
     pub(super) fn start_threads(&self) -> Result<(), Failure> {
-        start_threads(self.threads)
-    }
-}
-
-/// That many for the CPU's work, if a number is given; once.
-pub(super) fn start_threads(threads: Option<u16>) -> Result<(), Failure> {
-    if let Some(threads) = threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(threads))
-            .build_global()?;
-    }
-    Ok(())
-}
-
-pub(super) fn png_bits(name: String) -> PngBits {
-    match name.as_str() {
-        "16" => PngBits::Sixteen,
-        _ => PngBits::Eight,
+        self.threads.start()
     }
 }

@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::picture_flags::PictureFlags;
+use super::values::{above_zero, camera_noise, whole_range};
 use super::{Failure, Outcome, interrupt, print, progress, say, summary};
-use crate::gpu::GpuStages;
 use crate::output::{
     FilmNote, Format, Metadata, PngBits, Target, check_distinct, check_writable, write_exr,
     write_film, write_png, write_text,
@@ -16,8 +15,8 @@ use crate::output::{
 use crate::renderer::{
     Budget, CameraNoise, ErrorGoal, Renderer, RendererOptions, SCRAMBLES, Stats,
 };
-use crate::scene::{self, Choice, MotionBlurMethod, NoiseFit, NoiseProfile, Overrides};
-use crate::stages::finish;
+use crate::scene::{self, MotionBlurMethod, Overrides};
+use crate::stages::{GpuStages, finish};
 
 /// Renders a scene's virtual objects into its photograph
 ///
@@ -32,7 +31,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     flags: PictureFlags,
     /// Render only these of each pixel's rays, FROM to TO - 1, into an .exr that `mixray merge` puts together with the others
-    #[arg(long, value_name = "FROM..TO", value_parser = sample_range)]
+    #[arg(long, value_name = "FROM..TO", value_parser = whole_range)]
     range: Option<(u32, u32)>,
     /// Render until the standard error of the composite is down to this, root mean square over each tile of 16 x 16 pixels, linear;
     /// --rpp then limits the rays of a pixel [default: 16384]
@@ -51,11 +50,6 @@ pub(super) struct Arguments {
     /// Frame number of a video: with [noise], every frame has its own
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
-}
-
-pub(super) fn choice<T: Choice + Send + Sync>() -> impl TypedValueParser<Value = T> {
-    let names = T::CHOICES.iter().map(|&(name, _)| name);
-    PossibleValuesParser::new(names).try_map(|name| T::from_name(&name).ok_or("is not a choice"))
 }
 
 /// What was asked for, with outputs that can be written.
@@ -274,34 +268,6 @@ pub(super) fn write(
     Ok(())
 }
 
-pub(super) fn above_zero(text: &str) -> Result<f64, &'static str> {
-    match text.parse::<f64>() {
-        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        _ => Err("expected a number above 0"),
-    }
-}
-
-/// "0.01,0.2", or the name of a file.
-pub(super) fn camera_noise(text: &str) -> Result<CameraNoise, Failure> {
-    let parse = |part: &str| part.trim().parse::<f64>().ok();
-    let numbers: Option<Vec<f64>> = text.split(',').map(parse).collect();
-    match numbers.as_deref() {
-        Some(&[a, b]) if a >= 0.0 && b >= 0.0 && a + b > 0.0 && (a + b).is_finite() => {
-            Ok(CameraNoise {
-                fit: [NoiseFit { a, b }; 3],
-            })
-        }
-        Some(_) => Err(Failure(format!(
-            "--camera-noise {text}: expected two numbers of 0 or more, not both 0, such as 0.02,0.5"
-        ))),
-        None => {
-            let profile = NoiseProfile::read(Path::new(text))
-                .map_err(|problem| Failure(format!("{text}: {problem}")))?;
-            Ok(CameraNoise { fit: profile.fit })
-        }
-    }
-}
-
 /// Says which savings were switched off in vain.
 pub(super) fn say_idle(renderer: &Renderer, goal: Option<&ErrorGoal>) {
     let estimator = renderer.scene().settings.estimator;
@@ -311,16 +277,6 @@ pub(super) fn say_idle(renderer: &Renderer, goal: Option<&ErrorGoal>) {
             "note",
             &format!("--no-skip {name} changes nothing here: {reason}"),
         );
-    }
-}
-
-/// "16..32".
-fn sample_range(text: &str) -> Result<(u32, u32), &'static str> {
-    let ends = text.split_once("..");
-    let parsed = ends.and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?)));
-    match parsed {
-        Some((from, to)) if from < to => Ok((from, to)),
-        _ => Err("expected FROM..TO, two whole numbers, the first below the second"),
     }
 }
 

@@ -6,7 +6,8 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 
 use super::Failure;
-use crate::gpu::{AdapterChoice, GpuDevice, GpuStages};
+use crate::gpu::{AdapterChoice, GpuDevice};
+use crate::stages::GpuStages;
 
 #[derive(Debug, Args)]
 pub(super) struct StageDevice {

@@ -80,10 +80,7 @@ pub fn composite_pixel(sums: &PixelSums, ic: [f32; 3], mode: Composite) -> [f32;
     let means = Means::of(sums);
     let photo = Vec3::from(ic).as_dvec3() * (1.0 - means.mask);
     let value = match mode {
-        Composite::Quotient if sums.n_real > 0 => {
-            let real = means.r_ir.max(DVec3::splat(QUOTIENT_EPSILON));
-            photo * (DVec3::ONE + means.diff / real) + means.m_im
-        }
+        Composite::Quotient if sums.n_real > 0 => photo * means.quotient() + means.m_im,
         _ => {
             let covariance = means.m_ir * (1.0 - means.mask) - means.r_ir * means.mask;
             photo + means.m_im + means.diff - covariance
@@ -101,18 +98,14 @@ pub fn background_pixel(sums: &PixelSums, ic: [f32; 3], mode: Composite) -> [f32
     }
     let photo = Vec3::from(ic).as_dvec3();
     let value = match mode {
-        Composite::Quotient if sums.n_real > 0 => {
-            let means = Means::of(sums);
-            let real = means.r_ir.max(DVec3::splat(QUOTIENT_EPSILON));
-            photo * (DVec3::ONE + means.diff / real)
-        }
+        Composite::Quotient if sums.n_real > 0 => photo * Means::of(sums).quotient(),
         _ => photo + diff_sum / f64::from(real),
     };
     value.as_vec3().to_array()
 }
 
 /// Means over the samples of a pixel.
-pub(super) struct Means {
+pub(crate) struct Means {
     pub mask: f64,
     pub m_im: DVec3,
     pub diff: DVec3,
@@ -132,6 +125,11 @@ impl Means {
             m_ir: sums.m_ir.value() / n_real,
             r_ir: sums.r_ir.value() / n_real,
         }
+    }
+
+    /// What the quotient composite multiplies the photograph with; right only where a real sample was taken.
+    pub fn quotient(&self) -> DVec3 {
+        DVec3::ONE + self.diff / self.r_ir.max(DVec3::splat(QUOTIENT_EPSILON))
     }
 }
 

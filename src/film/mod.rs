@@ -11,6 +11,7 @@ mod sums;
 
 pub use accumulation::{Film, MergeError, PixelCounts, PixelKind};
 pub use compare::{Comparison, SizeMismatch, compare};
+pub(crate) use composite::Means;
 pub use composite::{
     Picture, Planes, QUOTIENT_EPSILON, background_pixel, composite, estimated_error, planes,
     variance,

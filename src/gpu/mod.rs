@@ -1,4 +1,4 @@
-//! The estimator and the camera stages on wgpu: device, buffers, specialised pipelines, passes.
+//! The estimator on wgpu: device, buffers, specialised pipelines, passes.
 //!
 //! Shaders are composed at run time from the modules in `shaders/` ([`compose`]), one entry point a kernel, with whatever the scene
 //! does not need left out ([`Features`]); what a kernel binds is read off its own code ([`kernel`]). [`GpuBackend`] runs paths as a
@@ -12,14 +12,12 @@ pub mod kernel;
 mod lanes;
 mod pacer;
 mod profile;
-pub mod stages;
 pub mod wavefront;
 
 pub use buffers::{Changed, SceneBuffers, SceneParts};
 pub use compose::{Composer, Features};
 pub use device::{AdapterChoice, AdapterReport, GpuDevice, list_adapters};
 pub use profile::KernelSeconds;
-pub use stages::GpuStages;
 pub use wavefront::{GpuBackend, PixelWork};
 
 /// What can go wrong on the GPU, in the words the user gets.

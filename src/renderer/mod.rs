@@ -122,8 +122,6 @@ pub struct Renderer {
     notes: Vec<String>,
     /// Where moving objects stand while the shutter is open; empty: nothing moves.
     instants: Vec<Instant>,
-    /// The first instant that may have samples left to take.
-    next_instant: usize,
     /// The picture's time.
     time_secs: f64,
     /// The error of a film that [`Renderer::render_to_error`] made.
@@ -170,7 +168,6 @@ impl Renderer {
             seconds: Seconds::default(),
             notes: Vec::new(),
             instants: Vec::new(),
-            next_instant: 0,
             time_secs,
             stated: None,
             surfaces: Vec::new(),

@@ -8,7 +8,9 @@ use glam::DVec3;
 use super::{Backend, Cancel, Pass, Progress, RenderError, Renderer};
 use crate::film::{Film, MergeError};
 use crate::gpu::Changed;
-use crate::packed::{FRAME_SHUTTER, PackedScene, instants, next_anchor, row_ends};
+use crate::packed::{
+    FRAME_SHUTTER, PIXEL_OUT_OF_REACH, PackedScene, PixelInfo, instants, next_anchor, row_ends,
+};
 use crate::scene::trajectory::CameraPath;
 use crate::scene::{Camera, Exposure, Lens, Photo};
 
@@ -100,7 +102,6 @@ impl Renderer {
     pub(super) fn prepare_shutter(&mut self) -> Result<bool, RenderError> {
         let swept_before = !self.instants.is_empty();
         self.instants = instants(&self.scene);
-        self.next_instant = 0;
         let swept = swept_before || !self.instants.is_empty();
         self.packed.sweep(&mut self.scene, &self.instants)?;
         self.packed
@@ -108,7 +109,8 @@ impl Renderer {
         Ok(swept)
     }
 
-    /// Takes the samples up to `end` (rays per pixel, absolute) instant by instant.
+    /// Takes the samples up to `end` (rays per pixel, absolute) instant by instant. With a readout time an instant has samples of other numbers in every
+    /// row, so that every instant is asked, whatever was taken before.
     pub(super) fn advance_in_time(
         &mut self,
         end: u32,
@@ -117,21 +119,20 @@ impl Renderer {
         progress: &mut dyn FnMut(Progress),
     ) -> Result<(), RenderError> {
         let start = std::time::Instant::now();
-        let total = self.scene.settings.rays_per_pixel;
-        while let Some(ends) = self.ends_of(self.next_instant, end) {
+        for instant in 0..self.instants.len() {
             let cancel = Cancel::new(cancelled, deadline);
             if cancel.is_cancelled() {
                 break;
             }
-            if has_work(&self.film, &ends) {
-                self.stand_at(self.next_instant)?;
-                self.run_pass(Pass::MainRows { ends: &ends }, &cancel)?;
+            let ends = self.ends_of(instant, end);
+            if !has_work(&self.film, &self.packed.pixels, &ends) {
+                continue;
             }
-            let whole = self.ends_of(self.next_instant, total);
-            if cancel.is_cancelled() || whole.is_some_and(|whole| whole != ends) {
+            self.stand_at(instant)?;
+            self.run_pass(Pass::MainRows { ends: &ends }, &cancel)?;
+            if cancel.is_cancelled() {
                 break;
             }
-            self.next_instant += 1;
             progress(Progress {
                 samples: self.samples(),
                 samples_total: self.end_sample - self.film.first_sample,
@@ -149,10 +150,10 @@ impl Renderer {
                 let all = everywhere && sums.m < sums.n && sums.n_real < sums.n;
                 all || self.film.needs_real(pixel)
             });
-            let ends = self.ends_of(instant, self.scene.settings.rays_per_pixel);
-            let (true, Some(ends)) = (lacking, ends) else {
+            if !lacking {
                 break;
-            };
+            }
+            let ends = self.ends_of(instant, self.scene.settings.rays_per_pixel);
             self.stand_at(instant)?;
             let pass = Pass::RealRows {
                 everywhere,
@@ -166,11 +167,11 @@ impl Renderer {
         Ok(())
     }
 
-    /// By row, the samples before the end of that instant, at most `end`; `None` after the last instant.
-    fn ends_of(&self, instant: usize, end: u32) -> Option<Vec<u32>> {
+    /// By row, the samples before the end of that instant, at most `end`.
+    fn ends_of(&self, instant: usize, end: u32) -> Vec<u32> {
         let total = self.scene.settings.rays_per_pixel;
-        let ends = row_ends(&self.scene, self.instants.get(instant)?, total);
-        Some(ends.into_iter().map(|row| row.min(end)).collect())
+        let ends = row_ends(&self.scene, &self.instants[instant], total);
+        ends.into_iter().map(|row| row.min(end)).collect()
     }
 
     /// Moves the virtual world to where it is at an instant.
@@ -184,11 +185,12 @@ impl Renderer {
     }
 }
 
-/// A pixel has not taken all samples before its row's end. Pixels out of reach take none, so the first of the row is not enough.
-fn has_work(film: &Film, ends: &[u32]) -> bool {
+/// A pixel within reach has not taken all samples before its row's end.
+fn has_work(film: &Film, infos: &[PixelInfo], ends: &[u32]) -> bool {
     let width = film.width as usize;
-    film.pixels.chunks(width).zip(ends).any(|(row, end)| {
-        row.iter()
-            .any(|sums| sums.n < end.saturating_sub(film.first_sample) * sums.sample_factor.max(1))
+    (0..film.pixels.len()).any(|pixel| {
+        let next = film.first_index(pixel) + film.pixels[pixel].n;
+        infos[pixel].flags & PIXEL_OUT_OF_REACH == 0
+            && next < film.end_index(pixel, ends[pixel / width])
     })
 }

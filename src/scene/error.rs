@@ -24,10 +24,10 @@ pub enum SceneError {
     },
 }
 
-pub(super) type Result<T> = std::result::Result<T, SceneError>;
+pub(crate) type Result<T> = std::result::Result<T, SceneError>;
 
 /// The text of a scene file, for turning byte offsets into lines and columns.
-pub(super) struct Source {
+pub(crate) struct Source {
     pub path: PathBuf,
     pub text: String,
     /// Files that were named and found.

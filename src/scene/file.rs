@@ -13,9 +13,8 @@ use super::photo::read_photo;
 use super::reader::Table;
 use super::settings::read_settings;
 use super::shutter::{read_camera_motion, read_shutter};
-use super::stages::read_stages;
 use super::trajectory::Intrinsics;
-use super::{Photo, Scene};
+use super::{Photo, Scene, Stages};
 
 const TABLES: &[&str] = &[
     "photo",
@@ -27,10 +26,6 @@ const TABLES: &[&str] = &[
     "virtual",
     "render",
     "shutter",
-    "noise",
-    "antialias",
-    "motion_blur",
-    "cartoon",
 ];
 
 /// What a caller brings in place of the scene file's own.
@@ -76,11 +71,11 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
         source.error(offset, format!("{message}; mend the TOML here"))
     })?;
     let root = Table::root(source, document.get_ref());
-    root.refuse_unknown(TABLES)?;
+    root.refuse_unknown(&[TABLES, Stages::TABLES].concat())?;
     let mut warnings = Vec::new();
     let (photo, exposure) = read_photo(&root, given.photo, &mut warnings)?;
     let settings = read_settings(&root, exposure)?;
-    let stages = read_stages(&root)?;
+    let stages = Stages::read(&root)?;
     let camera = read_camera(&root, photo.as_ref(), given.intrinsics.as_ref())?;
     let camera_path = read_camera_motion(&root)?;
     let shutter = read_shutter(&root)?;

@@ -6,44 +6,35 @@
 pub mod animation;
 mod camera;
 mod environment;
-mod error;
+pub(crate) mod error;
 mod file;
 mod fingerprint;
 pub mod gltf;
 mod image_file;
 mod light;
 mod material;
-mod noise_profile;
 mod object;
 mod photo;
 mod pose;
-mod reader;
+pub(crate) mod reader;
 mod scan;
 mod settings;
 pub(crate) mod shape;
 mod shutter;
 pub mod smooth;
 pub mod srgb;
-mod stages;
 #[cfg(test)]
 mod tests;
 pub mod trajectory;
 
+pub use crate::stages::settings::*;
 pub use error::SceneError;
 pub use file::{Given, load, load_with};
 pub use fingerprint::fingerprint_of;
-pub use noise_profile::{
-    Autocorrelation, LAGS, MAX_BINS, NOISE_PROFILE_VERSION, NoiseBin, NoiseFit, NoiseProfile,
-    WHITE, bin_index,
-};
 pub use photo::read_codes;
 pub use reader::Choice;
 pub use settings::Overrides;
 pub use shutter::{MotionKey, ObjectMotion, Shutter};
-pub use stages::{
-    AntialiasSettings, CartoonSettings, CartoonStyle, FlowSettings, MotionBlurMethod,
-    MotionBlurSettings, NoiseMethod, NoiseSettings, Stages,
-};
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -12,10 +12,10 @@ use toml::de::{DeTable, DeValue};
 use super::error::{Result, SceneError, Source};
 
 /// Lengths and coordinates beyond this have no meaning in f32 arithmetic that squares them.
-pub(super) const MAX_MAGNITUDE: f64 = 1e15;
+pub(crate) const MAX_MAGNITUDE: f64 = 1e15;
 
 /// Radiance and the like: larger values overflow when they are summed.
-pub(super) const MAX_RADIANCE: f64 = 1e30;
+pub(crate) const MAX_RADIANCE: f64 = 1e30;
 
 /// A setting that is one of a few names, in the scene file and on the command line alike.
 pub trait Choice: Copy + PartialEq + 'static {
@@ -41,7 +41,7 @@ pub trait Choice: Copy + PartialEq + 'static {
 
 /// One value of the document.
 #[derive(Clone)]
-pub(super) struct Node<'a> {
+pub(crate) struct Node<'a> {
     source: &'a Source,
     value: &'a DeValue<'a>,
     offset: usize,
@@ -287,7 +287,7 @@ impl<'a> Node<'a> {
 }
 
 /// A table of the document.
-pub(super) struct Table<'a> {
+pub(crate) struct Table<'a> {
     source: &'a Source,
     entries: &'a DeTable<'a>,
     offset: usize,
@@ -413,19 +413,19 @@ impl<'a> Table<'a> {
     }
 }
 
-pub(super) fn is_finite(x: f64) -> bool {
+pub(crate) fn is_finite(x: f64) -> bool {
     x.abs() <= MAX_MAGNITUDE
 }
 
-pub(super) fn is_positive(x: f64) -> bool {
+pub(crate) fn is_positive(x: f64) -> bool {
     x > 0.0 && x <= MAX_MAGNITUDE
 }
 
-pub(super) fn is_not_negative(x: f64) -> bool {
+pub(crate) fn is_not_negative(x: f64) -> bool {
     (0.0..=MAX_MAGNITUDE).contains(&x)
 }
 
-pub(super) fn is_unit(x: f64) -> bool {
+pub(crate) fn is_unit(x: f64) -> bool {
     (0.0..=1.0).contains(&x)
 }
 

@@ -5,10 +5,15 @@ use mixray::scene::Choice;
 
 use super::support::{Folder, QUICK};
 
+/// The quick benchmark as this subcommand.
+fn of(subcommand: &str) -> String {
+    QUICK.replacen("bench", &format!("bench {subcommand}"), 1)
+}
+
 #[test]
 fn each_saving_has_its_rows() {
     let folder = Folder::new();
-    let shown = folder.succeed(&format!("{QUICK} --ablate --goal-rpp 64"));
+    let shown = folder.succeed(&format!("{} --goal-rpp 64", of("ablate")));
     let report = folder.json("out/results.json");
     let rows = report["rows"].as_array().unwrap();
     // paper, direct, and direct without seven savings, at two counts of rays; two goals with their savings and without.
@@ -83,7 +88,6 @@ fn savings_and_goals_have_rows_by_name() {
 fn flags_that_would_do_nothing_are_refused() {
     let folder = Folder::new();
     for flag in [
-        "--ablate",
         "--no-skip cones",
         "--no-skip specialisation",
         "--target-error 0.1",
@@ -93,35 +97,23 @@ fn flags_that_would_do_nothing_are_refused() {
         let name = flag.split(' ').next().unwrap();
         folder.refuse(&format!("{QUICK} --estimators paper {flag}"), name);
     }
+    folder.refuse(
+        &format!("{} --estimators paper", of("ablate")),
+        "--estimators",
+    );
+    folder.refuse(&format!("{} --no-skip cones", of("ablate")), "--no-skip");
     folder.refuse(&format!("{QUICK} --goal-rpp 64"), "--goal-rpp");
     folder.refuse(
         &format!("{QUICK} --goal-rpp 64 --no-skip cones"),
         "--goal-rpp",
     );
-    for (what, flags) in [
-        (
-            "--report r.json",
-            "no-skip cones,target-error 1,camera-noise 1,filter,goal-rpp 64,rpp 4,seed 2,reference-rpp 64",
-        ),
-        (
-            "--growth",
-            "goal-rpp 64,reference-error 1,reference-rpp 64,filter",
-        ),
-        (
-            "--stress",
-            "goal-rpp 64,reference-error 1,reference-rpp 64,filter",
-        ),
-        (
-            "scene.toml --gpu-time",
-            "goal-rpp 64,reference-error 1,reference-rpp 64,filter",
-        ),
-        ("--paper-table", "goal-rpp 64,filter"),
-    ] {
-        for flag in flags.split(',') {
-            let output = folder.run(&format!("bench {what} --{flag}"));
-            assert_eq!(output.status.code(), Some(2), "{what} --{flag}");
-            let message = String::from_utf8_lossy(&output.stderr);
-            assert!(message.contains("cannot be used with"), "{message}");
-        }
+    for flag in
+        "no-skip cones,target-error 1,camera-noise 1,filter,goal-rpp 64,rpp 4,seed 2,reference-rpp 64"
+            .split(',')
+    {
+        let output = folder.run(&format!("bench --report r.json --{flag}"));
+        assert_eq!(output.status.code(), Some(2), "--{flag}");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(message.contains("cannot be used with"), "{message}");
     }
 }

@@ -1,4 +1,4 @@
-//! `mixray bench --growth`.
+//! `mixray bench growth`.
 
 use super::support::Folder;
 
@@ -7,7 +7,7 @@ fn growth_has_a_curve_a_law_and_method() {
     let folder = Folder::new();
     folder.write("page.md", "a\n<!-- growth -->\n<!-- end -->\nb\n");
     let table = folder.succeed(
-        "bench --growth=rays,objects --shrink 16 --repeats 1 --backends cpu -o out --write-docs page.md",
+        "bench growth rays,objects --shrink 16 --repeats 1 --backends cpu -o out --write-docs page.md",
     );
     assert!(
         table.contains("virtual objects") && table.contains("expected"),
@@ -43,7 +43,7 @@ fn growth_has_a_curve_a_law_and_method() {
             .contains("| render | cpu paper jittered |")
     );
     assert_eq!(folder.read("out/growth.csv").lines().count(), 21);
-    for wrong in ["bench scene.toml --growth", "bench --growth=moons"] {
+    for wrong in ["bench growth scene.toml", "bench growth moons"] {
         assert_eq!(folder.run(wrong).status.code(), Some(2), "{wrong}");
     }
 }

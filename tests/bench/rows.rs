@@ -212,7 +212,7 @@ fn an_interrupted_benchmark_keeps_what_is_finished() {
 #[test]
 fn the_papers_table_has_a_row_a_count_of_rays() {
     let folder = Folder::new();
-    let shown = folder.succeed("bench --paper-table --backends cpu --repeats 1 --shrink 24 -o out");
+    let shown = folder.succeed("bench paper-table --backends cpu --repeats 1 --shrink 24 -o out");
     let table = folder.json("out/paper.json");
     let rows = table["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 6, "{shown}");

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use mixray::scene::{AlphaMode, BackendChoice, Material, Scene};
 
-use crate::support::*;
+use super::support::*;
 
 /// Independent renders a side.
 const SEEDS: u32 = 16;

@@ -7,7 +7,7 @@ use mixray::scene::{
     TextureRef, Wrap,
 };
 
-use crate::support::*;
+use super::support::*;
 
 /// Independent renders a side.
 const SEEDS: u32 = 16;

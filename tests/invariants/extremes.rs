@@ -4,10 +4,10 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use mixray::bench::stress::{fan_of_slivers, placed};
 use mixray::scene::{BackendChoice, Environment, EnvironmentMap, Primitive, Scene};
-use mixray::stress::{fan_of_slivers, placed};
 
-use crate::support::*;
+use super::support::*;
 
 /// A glass ball, a metal box on the table exactly, a lamp, defocus.
 fn still_life() -> Scene {

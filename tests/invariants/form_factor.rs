@@ -3,7 +3,7 @@
 use mixray::renderer::Renderer;
 use mixray::scene::{BackendChoice, Scene};
 
-use crate::support::*;
+use super::support::*;
 
 const ALBEDO: f64 = 0.6;
 const SKY: f64 = 1.5;

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use mixray::scene::{BackendChoice, Scene};
 
-use crate::support::*;
+use super::support::*;
 
 /// A photograph of the furnace itself, radiance 1 from everywhere.
 fn furnace(objects: &str) -> Scene {

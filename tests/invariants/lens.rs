@@ -2,7 +2,7 @@
 
 use mixray::scene::{Aperture, BackendChoice, Scene};
 
-use crate::support::*;
+use super::support::*;
 
 const SIDE_PX: u32 = 40;
 const FX: f64 = 100.0;

@@ -7,7 +7,7 @@ use glam::Vec3;
 use mixray::film::{PixelKind, Sum3, composite};
 use mixray::scene::{BackendChoice, Composite, Scene, Side};
 
-use crate::support::*;
+use super::support::*;
 
 const SEEDS: u32 = 16;
 

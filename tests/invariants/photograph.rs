@@ -6,7 +6,7 @@ use mixray::output::{PngBits, Target, write_png};
 use mixray::renderer::{RayTotals, Renderer};
 use mixray::scene::{BackendChoice, Photo, Scene};
 
-use crate::support::*;
+use super::support::*;
 
 const WIDTH: u32 = 32;
 const HEIGHT: u32 = 24;

@@ -3,7 +3,7 @@
 use mixray::renderer::{Budget, RenderError, Renderer, RendererOptions};
 use mixray::scene::{BackendChoice, SamplerKind, Scene};
 
-use crate::support::*;
+use super::support::*;
 
 const RAYS: u32 = 20;
 

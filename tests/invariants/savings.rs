@@ -6,7 +6,7 @@ use mixray::film::Picture;
 use mixray::renderer::{CameraNoise, ErrorGoal, Renderer, RendererOptions, Skip};
 use mixray::scene::{BackendChoice, NoiseFit, Scene};
 
-use crate::support::*;
+use super::support::*;
 
 /// Pictures that are compared bit by bit.
 const SEEDS: u32 = 16;

@@ -4,7 +4,7 @@ use mixray::film::{Picture, planes};
 use mixray::renderer::{ErrorGoal, Renderer, RendererOptions, SCRAMBLES};
 use mixray::scene::{BackendChoice, Composite, Scene};
 
-use crate::support::*;
+use super::support::*;
 
 const SEEDS: u32 = 16;
 
@@ -91,7 +91,7 @@ fn the_stated_error_predicts_the_true_one(backend: BackendChoice) {
 fn it_does_so_where_light_is_rare(backend: BackendChoice) {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/far/scene.toml");
     let scene = mixray::scene::load(std::path::Path::new(path)).expect("the scene loads");
-    let (stated, sampled) = mean_squared_z(mixray::report::shrink(scene, 10), 0.02, backend);
+    let (stated, sampled) = mean_squared_z(mixray::bench::shrink(scene, 10), 0.02, backend);
     assert!((0.75..1.35).contains(&stated), "{stated}");
     assert!(!(0.75..1.35).contains(&sampled), "control: {sampled}");
 }

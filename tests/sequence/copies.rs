@@ -2,7 +2,7 @@
 
 use image::{Rgb, RgbImage};
 use mixray::scene::MotionBlurSettings;
-use mixray::stages::copies::{Copies, draw_copies};
+use mixray::stages::motion_blur::{Copies, draw_copies};
 
 use super::support::Folder;
 

@@ -1,10 +1,10 @@
 //! Rows that tell what a saving is worth: `direct` with it and without it, and what is rendered to a goal instead of a number of rays.
 
-use super::{Arguments, Job};
+use super::rows::{Arguments, Job};
+use crate::bench::{Aim, Goal, Method, Truth, rmse_of};
 use crate::cli::{Failure, progress, say};
 use crate::packed::instants;
 use crate::renderer::{CameraNoise, Skip};
-use crate::report::{Aim, Goal, Method, Truth, rmse_of};
 use crate::scene::{BackendChoice, Choice, Estimator, NoiseFit, Scene};
 
 /// sigma^2 = A y + B of a camera at a low gain, 8-bit codes, where nobody tells of another.
@@ -22,11 +22,11 @@ impl Arguments {
 
     /// Rows that only `direct` has want it among the estimators.
     pub(super) fn check_direct(&self) -> Result<(), Failure> {
-        if self.estimators.is_empty() || self.estimators.contains(&Estimator::Direct) {
+        if self.runs.estimators.is_empty() || self.runs.estimators.contains(&Estimator::Direct) {
             return Ok(());
         }
         for (flag, given) in [
-            ("--ablate", self.ablate),
+            ("ablate", self.ablate),
             ("--no-skip", !self.no_skip.is_empty()),
             ("--target-error", self.target_error.is_some()),
             ("--camera-noise", self.camera_noise.is_some()),
@@ -47,7 +47,7 @@ impl Arguments {
             || self.camera_noise.is_some()
             || self.savings().into_iter().any(wants_goal);
         if self.goal_rpp.is_some() && !to_goal {
-            let message = "--goal-rpp limits rows with a goal, and there are none; expected a goal; add --target-error, --camera-noise or --ablate";
+            let message = "--goal-rpp limits rows with a goal, and there are none; expected a goal; add --target-error or --camera-noise, or measure with ablate";
             return Err(Failure(message.to_owned()));
         }
         Ok(())
@@ -94,7 +94,7 @@ impl Job {
         let goals = (self.goals().into_iter()).filter(|(_, wanted)| rests && *wanted);
         let rows = goals.map(|(skip, _)| 1 + u64::from(savings.contains(&skip)));
         let rows = rows.sum::<u64>() * self.plain().count() as u64;
-        let plan = self.plan(self.arguments.rpp.clone(), self.methods.clone());
+        let plan = self.plan(self.arguments.rays.ascending(), self.methods.clone());
         plan.runs() + rows * (1 + u64::from(plan.repeats))
     }
 
@@ -160,10 +160,17 @@ impl Job {
         let Some(truth) = truth_of(method) else {
             return Ok(None);
         };
-        let rays = &self.arguments.rpp;
+        let rays = self.arguments.rays.ascending();
         let rays = rays[rays.len() / 2];
         steps.say(&format!("{}: {}, for a goal", scene.name, method.label()));
-        let rmse = rmse_of(scene, *method, rays, self.arguments.seed, truth, cancelled)?;
+        let rmse = rmse_of(
+            scene,
+            *method,
+            rays,
+            self.arguments.runs.seed,
+            truth,
+            cancelled,
+        )?;
         Ok(one_digit(rmse).map(Aim::TargetError))
     }
 

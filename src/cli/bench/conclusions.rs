@@ -1,6 +1,6 @@
 //! What follows from the rows together: slopes, and what a method needs for an error.
 
-use crate::report::{Method, Reach, Report, Row, Target, cost_to_reach, log_log_slope};
+use crate::bench::{Method, Reach, Report, Row, Target, cost_to_reach, log_log_slope};
 
 /// Slopes and targets from the rows.
 pub(super) fn conclude(report: &mut Report, target_rmse: Option<f64>) {

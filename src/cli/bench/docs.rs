@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::files::read_text;
+use crate::bench::replace_section;
 use crate::cli::Failure;
 use crate::output::write_text;
-use crate::report::replace_section;
 
 /// A page with a section for this table.
 pub(super) struct Docs {

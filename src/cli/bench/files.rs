@@ -2,10 +2,39 @@
 
 use std::path::Path;
 
-use super::benchmark::Gallery;
+use serde::Serialize;
+
+use super::command_line;
+use crate::bench::{Axis, FORMAT, Machine, Plot, Report, Shot, Truth, csv, page, plots};
 use crate::cli::{Failure, say};
 use crate::output::{write_bytes, write_text};
-use crate::report::{Axis, FORMAT, Plot, Report, csv, page, plots};
+use crate::scene::Composite;
+
+/// All that a scene's pictures are shown with.
+#[derive(Default)]
+pub(super) struct Gallery {
+    pub shots: Vec<Shot>,
+    pub truths: Vec<(String, Composite, Truth)>,
+}
+
+/// Figures under `name`, with what they were measured by and on.
+pub(super) fn write_json(
+    path: &Path,
+    machine: &Machine,
+    name: &str,
+    figures: &impl Serialize,
+) -> Result<(), Failure> {
+    let mut json = serde_json::to_string_pretty(&serde_json::json!({
+        "format": FORMAT,
+        "mixray": env!("CARGO_PKG_VERSION"),
+        "command": command_line(),
+        "machine": machine,
+        name: figures,
+    }))?;
+    json.push('\n');
+    write_text(path, &json)?;
+    Ok(())
+}
 
 pub(super) fn write_figures(report: &Report, folder: &Path) -> Result<(), Failure> {
     let mut json = serde_json::to_string_pretty(report)?;

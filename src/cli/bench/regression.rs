@@ -1,7 +1,7 @@
 //! `--against`: what became slower or worse.
 
+use crate::bench::{Report, Verdict, against};
 use crate::cli::{Failure, print, say};
-use crate::report::{Report, Verdict, against};
 
 /// Prints the comparison; true if something regressed.
 pub(super) fn compare(report: &Report, earlier: &Report, tolerance: f64) -> Result<bool, Failure> {

@@ -12,7 +12,6 @@ use super::report::{Frames, Seconds, Stats};
 use crate::cli::progress::Steps;
 use crate::cli::render::say_idle;
 use crate::cli::{Failure, Outcome, interrupt, print, say};
-use crate::gpu::GpuStages;
 use crate::output::{check_writable, write_text};
 use crate::packed::next_anchor;
 use crate::renderer::{Budget, FrameEdit, PreviousView, RayTotals, Renderer, RendererOptions};
@@ -20,7 +19,7 @@ use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{
     BackendChoice, Camera, Exposure, Lens, MotionBlurMethod, Scene, fingerprint_of,
 };
-use crate::stages::{Finished, finish};
+use crate::stages::{Finished, GpuStages, finish};
 use crate::video::{FrameSink, FrameSource, Header, SinkPlan, VideoFrame};
 
 /// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
@@ -277,7 +276,7 @@ impl Sequence<'_> {
             motion.as_ref(),
             started.gpu.as_ref(),
         );
-        self.seconds.add_stages(&seconds);
+        self.seconds.stages.add(&seconds);
         self.frames.rendered += 1;
         self.frames.moving += u32::from(renderer.is_moving());
         self.non_finite_samples += renderer.film().non_finite_samples();

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::picture_flags::PictureFlags;
+use super::values::whole_range;
 use super::{Failure, Outcome};
 
 /// Renders a scene's virtual objects into the frames of a video
@@ -32,7 +33,7 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "PATH", required_unless_present = "check")]
     output: Option<PathBuf>,
     /// Only the frames with these numbers, FROM to TO - 1
-    #[arg(long, value_name = "FROM..TO", value_parser = frame_range)]
+    #[arg(long, value_name = "FROM..TO", value_parser = whole_range)]
     range: Option<(u32, u32)>,
     /// Numbers may be missing among the frames of a folder
     #[arg(long)]
@@ -61,14 +62,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     match &arguments.check {
         Some(points) => check::run(arguments, points.as_deref()),
         None => job::run(arguments),
-    }
-}
-
-fn frame_range(text: &str) -> Result<(u32, u32), &'static str> {
-    let ends = text.split_once("..");
-    match ends.and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?))) {
-        Some((from, to)) if from < to => Ok((from, to)),
-        _ => Err("expected FROM..TO, two whole numbers, the first below the second"),
     }
 }
 

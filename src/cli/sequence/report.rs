@@ -8,7 +8,7 @@ use crate::renderer::{RayTotals, Renderer};
 use crate::stages::StageSeconds;
 
 /// Seconds over all frames, by what they were spent on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(super) struct Seconds {
     /// Reading and decoding frames.
     pub load: f64,
@@ -19,32 +19,15 @@ pub(super) struct Seconds {
     pub edit: f64,
     pub render: f64,
     pub composite: f64,
-    pub antialias: f64,
-    pub motion_blur: f64,
-    pub noise: f64,
-    pub cartoon: f64,
+    #[serde(flatten)]
+    pub stages: StageSeconds,
     pub write: f64,
 }
 
 impl Seconds {
-    pub(super) fn add_stages(&mut self, stages: &StageSeconds) {
-        self.antialias += stages.antialias;
-        self.motion_blur += stages.motion_blur;
-        self.noise += stages.noise;
-        self.cartoon += stages.cartoon;
-    }
-
     /// What is spent on every frame.
     fn of_frames(&self) -> f64 {
-        self.load
-            + self.edit
-            + self.render
-            + self.composite
-            + self.antialias
-            + self.motion_blur
-            + self.noise
-            + self.cartoon
-            + self.write
+        self.load + self.edit + self.render + self.composite + self.stages.total() + self.write
     }
 }
 
@@ -121,13 +104,9 @@ impl Stats {
             each(s.render),
             each(s.composite)
         );
-        for (name, seconds) in [
-            ("antialias", s.antialias),
-            ("motion blur", s.motion_blur),
-            ("noise", s.noise),
-            ("cartoon", s.cartoon),
-        ] {
+        for (name, seconds) in s.stages.by_name() {
             if seconds > 0.0 {
+                let name = name.replace('_', " ");
                 let _ = write!(text, ", {name} {:.1}", each(seconds));
             }
         }

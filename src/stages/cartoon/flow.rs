@@ -6,9 +6,9 @@
 
 use rayon::prelude::*;
 
+use super::FlowSettings;
 use super::edges::{smoothstep, sobel};
 use super::planes::{PAD, Planes};
-use crate::scene::FlowSettings;
 
 /// Ratio of the outer Gaussian's standard deviation to the inner one's, which makes the difference nearest to a Laplacian.
 const OUTER: f32 = 1.6;

@@ -13,22 +13,43 @@
 
 mod edges;
 mod flow;
+pub(super) mod gpu;
 mod planes;
+pub(super) mod settings;
 mod simplify;
 
 use rayon::prelude::*;
 
-use super::EncodedImage;
-use crate::scene::{CartoonSettings, CartoonStyle};
+use super::finish::{Shot, Stage};
+use super::{EncodedImage, GpuStages};
+use crate::gpu::GpuError;
 use edges::{gradient_row, smoothstep};
 pub use flow::flow_weights;
 use planes::{PAD, Planes, rgb_from_yuv};
+pub use settings::{CartoonSettings, CartoonStyle, FlowSettings};
 
 /// Red and blue weights of brightness (BT.601); green has the rest.
 const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 /// Largest values of U and V.
 const U_MAX: f32 = 0.436;
 const V_MAX: f32 = 0.615;
+
+pub(super) const STAGE: Stage = Stage {
+    name: "cartoon",
+    wants: |shot| shot.scene.stages.cartoon.is_some(),
+    run,
+};
+
+fn run(shot: &mut Shot, gpu: Option<&GpuStages>) -> Result<(), GpuError> {
+    let settings = shot.scene.stages.cartoon.unwrap_or_default();
+    let image = EncodedImage::from_picture(&shot.picture);
+    let done = match gpu {
+        Some(gpu) => gpu.cartoon(&image, &settings, false)?,
+        None => cartoon(&image, &settings, false),
+    };
+    shot.picture = done.image.to_picture();
+    Ok(())
+}
 
 /// A stylised picture.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! A filter that gives white noise a measured autocorrelation.
 
-use crate::scene::{Autocorrelation, LAGS};
+use crate::stages::settings::{Autocorrelation, LAGS};
 
 /// 7 x 7 weights.
 pub const KERNEL_SIDE: usize = 2 * LAGS + 1;

@@ -1,8 +1,8 @@
 //! How much noise a pixel lacks. Twin of `shaders/stages/noise/mod.wgsl`.
 
 use super::BIN_SHIFT;
-use crate::scene::NoiseProfile;
 use crate::stages::curve::{decode_slope, encode_};
+use crate::stages::settings::NoiseProfile;
 
 /// Sigma by bin and channel, DN.
 pub fn sigma_table(profile: &NoiseProfile) -> Vec<[f32; 3]> {

@@ -7,7 +7,7 @@
 //! max(0, s(If)^2 - (1-a)^2 r^2 s(Ic)^2 - v)
 //! ```
 //!
-//! is added. s comes from the [`NoiseProfile`](crate::scene::NoiseProfile), by bin of the pixel's intensity; it is measured in encoded
+//! is added. s comes from the [`NoiseProfile`], by bin of the pixel's intensity; it is measured in encoded
 //! values, s_lin = s |d linear / d encoded|. The noise is added to the encoded value, so that it has the measured sigma there however
 //! curved the response is.
 //!
@@ -16,13 +16,19 @@
 //! rotation for every frame.
 
 mod field;
+pub(super) mod gpu;
 mod kernel;
 mod missing;
+mod own_variance;
+pub(super) mod settings;
+mod stage;
 mod textures;
 
 pub use field::{FieldBand, NoiseField, white_deviates};
 pub use kernel::{autocorrelation_of, fit_kernel};
 pub use missing::{missing_sigma, sigma_table};
+pub use settings::{LAGS, NoiseBin, NoiseMethod, NoiseProfile, NoiseSettings};
+pub(super) use stage::STAGE;
 pub use textures::{Placement, Texture, Textures};
 
 use std::ops::Range;
@@ -31,7 +37,6 @@ use rayon::prelude::*;
 
 use super::curve::{decode_, encode_};
 use crate::film::Picture;
-use crate::scene::{NoiseMethod, NoiseSettings};
 
 /// Intensities are shifted by this much before they are sorted into bins, so that no whole code lies on the border of two, where
 /// rounding would decide. DN.

@@ -8,7 +8,7 @@ use rand_distr::{Distribution, Normal};
 
 use super::missing::bin_of;
 use crate::math::hash_combine;
-use crate::scene::{NoiseBin, NoiseSettings};
+use crate::stages::settings::{NoiseBin, NoiseSettings};
 
 /// Channel variations in DN, row-major, square.
 pub type Texture = Vec<[f32; 3]>;

@@ -1,0 +1,76 @@
+//! How the values of flags are read, where several commands take the like.
+
+use std::path::Path;
+
+use clap::builder::{PossibleValuesParser, RangedI64ValueParser, TypedValueParser};
+
+use super::Failure;
+use crate::output::PngBits;
+use crate::renderer::CameraNoise;
+use crate::scene::{Choice, NoiseFit, NoiseProfile, Settings};
+
+/// One of the names that the scene file uses too.
+pub(super) fn choice<T: Choice + Send + Sync>() -> impl TypedValueParser<Value = T> {
+    let names = T::CHOICES.iter().map(|&(name, _)| name);
+    PossibleValuesParser::new(names).try_map(|name| T::from_name(&name).ok_or("is not a choice"))
+}
+
+/// From `least` to what a render can count.
+pub(super) fn rays_per_pixel(least: u32) -> RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(i64::from(least)..=i64::from(Settings::MAX_RAYS_PER_PIXEL))
+}
+
+pub(super) fn png_bits() -> impl TypedValueParser<Value = PngBits> {
+    PossibleValuesParser::new(["8", "16"]).map(|name| match name.as_str() {
+        "16" => PngBits::Sixteen,
+        _ => PngBits::Eight,
+    })
+}
+
+pub(super) fn above_zero(text: &str) -> Result<f64, &'static str> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("expected a number above 0"),
+    }
+}
+
+/// In the range, ends included; the caller says what was expected.
+pub(super) fn within(text: &str, least: f32, most: f32) -> Option<f32> {
+    text.parse().ok().filter(|x| (least..=most).contains(x))
+}
+
+/// A share, a weight.
+pub(super) fn unit(text: &str) -> Result<f32, &'static str> {
+    within(text, 0.0, 1.0).ok_or("expected a number from 0 to 1")
+}
+
+/// "16..32".
+pub(super) fn whole_range(text: &str) -> Result<(u32, u32), &'static str> {
+    let ends = text.split_once("..");
+    let parsed = ends.and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?)));
+    match parsed {
+        Some((from, to)) if from < to => Ok((from, to)),
+        _ => Err("expected FROM..TO, two whole numbers, the first below the second"),
+    }
+}
+
+/// "0.01,0.2", or the name of a file.
+pub(super) fn camera_noise(text: &str) -> Result<CameraNoise, Failure> {
+    let parse = |part: &str| part.trim().parse::<f64>().ok();
+    let numbers: Option<Vec<f64>> = text.split(',').map(parse).collect();
+    match numbers.as_deref() {
+        Some(&[a, b]) if a >= 0.0 && b >= 0.0 && a + b > 0.0 && (a + b).is_finite() => {
+            Ok(CameraNoise {
+                fit: [NoiseFit { a, b }; 3],
+            })
+        }
+        Some(_) => Err(Failure(format!(
+            "--camera-noise {text}: expected two numbers of 0 or more, not both 0, such as 0.02,0.5"
+        ))),
+        None => {
+            let profile = NoiseProfile::read(Path::new(text))
+                .map_err(|problem| Failure(format!("{text}: {problem}")))?;
+            Ok(CameraNoise { fit: profile.fit })
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Host side of `shaders/stages/antialias.wgsl`.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::AntialiasSettings;
+use crate::film::Picture;
+use crate::gpu::GpuError;
+use crate::stages::GpuStages;
+use crate::stages::antialias::is_binary;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(in crate::stages) struct AntialiasParams {
+    width: u32,
+    height: u32,
+    beta: f32,
+    pad: u32,
+}
+
+impl GpuStages {
+    /// Twin of [`crate::stages::antialias::antialias`].
+    ///
+    /// # Errors
+    /// The picture does not fit the device, or the device was lost; the picture is then unchanged.
+    pub fn antialias(
+        &self,
+        picture: &mut Picture,
+        mask: &[f32],
+        settings: &AntialiasSettings,
+    ) -> Result<bool, GpuError> {
+        if !is_binary(mask) {
+            return Ok(false);
+        }
+        let params = self.uniform(&AntialiasParams {
+            width: picture.width,
+            height: picture.height,
+            beta: settings.beta,
+            pad: 0,
+        });
+        let values = picture.linear.as_flattened();
+        let source = self.array("picture", values)?;
+        let result = self.array("picture", values)?;
+        let mask = self.array("mask", mask)?;
+        let mut encoder = self.encoder();
+        self.dispatch(
+            &mut encoder,
+            "stage_antialias",
+            &[
+                (0, 0, &params),
+                (0, 1, &source),
+                (0, 2, &mask),
+                (0, 3, &result),
+            ],
+            (picture.width, picture.height),
+        )?;
+        let words = self.finish(encoder, &result, values.len())?;
+        picture.linear = words.as_chunks::<3>().0.to_vec();
+        Ok(true)
+    }
+}

@@ -1,7 +1,0 @@
-//! `mixray bench`, `mixray render --range` and `mixray merge` through the built program.
-
-mod ablation;
-mod growth;
-mod merge;
-mod rows;
-mod support;

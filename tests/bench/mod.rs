@@ -1,0 +1,8 @@
+//! `mixray bench`, `mixray render --range` and `mixray merge` through the built program.
+
+mod ablation;
+mod growth;
+mod merge;
+mod rows;
+mod subcommands;
+mod support;

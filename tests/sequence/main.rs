@@ -1,9 +1,0 @@
-//! Moving cameras and objects: motion blur against its analytic profiles, sequences of frames in and out.
-
-mod animation;
-mod blur;
-mod copies;
-mod errors;
-mod frames;
-mod resume;
-mod support;
