@@ -1,6 +1,6 @@
 // Twin of the f32 half of src/camera/lens.rs: the same operations in the same order.
 
-import package::packed::bindings::frame;
+import package::gpu::buffers::frame;
 import package::math::{dot3, normalize3, sincos_2pi};
 import package::camera::shutter::{CameraPose, camera_pose};
 

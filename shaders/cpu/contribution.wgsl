@@ -1,6 +1,6 @@
 // What estimator and vertex share: random numbers of a decision, weights, accumulation. Rust twin: src/cpu/contribution.rs.
 
-import package::packed::bindings::{frame, pixels};
+import package::gpu::buffers::{frame, pixels};
 import package::camera::sampler::{SampleKey, sample_4d};
 import package::cpu::state::{
     DELTA_DENSITY, MODE_REAL, MODE_SHARED, PathState, path_radiances_real, path_results,

@@ -1,6 +1,8 @@
 // The estimator as a state machine. Rust twin: src/cpu/estimator.rs, where the method is described.
 
-import package::packed::bindings::{NONE, frame, pixels, FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PIXEL_BEAM_MAY_MEET_VIRTUAL};
+import package::gpu::buffers::{frame, pixels};
+import package::packed::records::{FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PIXEL_BEAM_MAY_MEET_VIRTUAL};
+import package::shared::NONE;
 import package::material::bsdf::bsdf_albedo;
 import package::light::cones::cone_pdf;
 import package::cpu::contribution::{accumulate, density_weight, sample_key};

@@ -1,6 +1,8 @@
 // Answers a sample's ray request. Rust twin: src/cpu/request.rs.
 
-import package::packed::bindings::{NONE, frame, materials, triangles, FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_MASK, MATERIAL_ALPHA_BLEND};
+import package::gpu::buffers::{frame, materials, triangles};
+import package::packed::records::{FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_MASK, MATERIAL_ALPHA_BLEND};
+import package::shared::NONE;
 import package::math::{dot3, hash_combine, length3, uniform_from_bits};
 import package::cpu::state::{
     COINCIDENCE, FAR, Hits, MISS, PathRay, PathState,

@@ -1,6 +1,6 @@
 // The state of one sample in flight. Rust twin: src/cpu/state.rs.
 
-import package::packed::bindings::NONE;
+import package::shared::NONE;
 import package::accel::trace::Hit;
 
 const STAGE_DONE: u32 = 0u;

@@ -1,9 +1,11 @@
 // One vertex of any path: emission, next event, cone direction, continuation. Rust twin: src/cpu/vertex.rs.
 
-import package::packed::bindings::{
-    NONE, frame, materials, FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT,
-    MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
+import package::gpu::buffers::{frame, materials};
+import package::packed::records::{
+    FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED,
+    MATERIAL_UNLIT,
 };
+import package::shared::NONE;
 import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample};
 import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
 import package::cpu::contribution::{accumulate, density_weight, draw};

@@ -1,7 +1,7 @@
 // The kernels of the wavefront: samples begin, ask for rays, are answered, and are summed. One step of a path a dispatch, so that no
 // invocation runs long and the lanes that are done make room.
 
-import package::packed::bindings::frame;
+import package::gpu::buffers::frame;
 import package::cpu::estimator::{advance, begin_sample};
 import package::film::sums::{guide_add, pixel_add, pixel_add_real};
 import package::gpu::lanes::{

@@ -1,6 +1,6 @@
 // The cones in which the virtual geometry's bounding spheres are seen from a point. Rust twin: src/light/cones.rs.
 
-import package::packed::bindings::frame;
+import package::gpu::buffers::frame;
 import package::math::{cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
 
 const PI: f32 = 3.14159265358979;

@@ -1,6 +1,6 @@
 // Rectangular lights by solid angle. Rust twin: src/light/rectangle.rs, where the formulas are explained.
 
-import package::packed::bindings::{LIGHT_QUAD, Light};
+import package::packed::records::{LIGHT_QUAD, Light};
 import package::math::{atan2_, cross3, dot3, length3, safe_sqrt, sincos_2pi};
 
 const MIN_SOLID_ANGLE: f32 = 0.02;

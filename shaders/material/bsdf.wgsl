@@ -1,6 +1,6 @@
 // Twin of src/material/bsdf.rs: the same operations in the same order.
 
-import package::packed::bindings::MATERIAL_LAMBERTIAN;
+import package::packed::records::MATERIAL_LAMBERTIAN;
 import package::material::fresnel::{fresnel_dielectric, refract_about};
 import package::material::ggx::{ggx_reflect, ggx_refract, ggx_sample_half, GgxEval};
 import package::material::lobes::{

@@ -1,6 +1,6 @@
 // Twin of src/material/lobes.rs: the same operations in the same order.
 
-import package::packed::bindings::{MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT};
+import package::packed::records::{MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT};
 import package::material::fresnel::{fresnel_dielectric, normal_reflectance, relative_index, schlick, RelativeIndex};
 import package::material::ggx::MIN_COS;
 import package::math::dot3;

@@ -1,10 +1,11 @@
 // Twin of src/material/surface.rs: the same operations in the same order.
 
-import package::packed::bindings::{
-    frame, materials, photo_albedo, texture_refs, triangles, vertices, Material, Vertex, NONE, TEXTURE_UV1,
-    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO, MATERIAL_QUAD_LIGHT,
-    MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT
+import package::gpu::buffers::{frame, materials, photo_albedo, texture_refs, triangles, vertices};
+import package::packed::records::{
+    Material, Vertex, TEXTURE_UV1, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
+    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
 };
+import package::shared::NONE;
 @if(photo_albedo) import package::camera::lens::camera_project;
 import package::math::{cross3, dot3, safe_sqrt};
 import package::material::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};

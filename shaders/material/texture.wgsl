@@ -1,6 +1,8 @@
 // Twin of src/material/texture.rs: the same operations in the same order.
 
-import package::packed::bindings::{texels, texture_refs, TextureRef, NONE, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1, TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT};
+import package::gpu::buffers::{texels, texture_refs};
+import package::packed::records::{TextureRef, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1, TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT};
+import package::shared::NONE;
 
 const WRAP_REPEAT: u32 = 0u;
 const WRAP_MIRROR: u32 = 1u;

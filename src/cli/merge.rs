@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::progress::Bar;
 use super::render::write;
 use super::values::png_bits;
 use super::{Failure, Outcome, print, say};
 use crate::film::Film;
 use crate::output::{FilmNote, PngBits, Target, check_distinct, read_film};
-use crate::renderer::Renderer;
+use crate::renderer::{Progress, Renderer, Watcher};
 use crate::scene::{self, BackendChoice, Scene};
 
 /// Puts films of sample ranges together
@@ -74,7 +75,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         range.1 = part.note.range.1;
     }
     let total = first.note.total;
-    let renderer = Renderer::with_film(scene, film, range.1, first.note.without)?;
+    let bar = Bar::new("building trees", "rays per pixel");
+    let hear = |progress: &Progress| bar.hear(progress);
+    let renderer = Renderer::with_film(
+        scene,
+        film,
+        range.1,
+        first.note.without,
+        &Watcher::none().heard_by(&hear),
+    )?;
+    drop(bar);
     let complete = range == (0, total);
     write(
         &renderer,

@@ -14,6 +14,7 @@ mod merge;
 mod motion_blur;
 mod noise;
 mod picture_flags;
+mod pool;
 mod progress;
 mod render;
 mod sequence;
@@ -72,17 +73,21 @@ impl<E: std::error::Error> From<E> for Failure {
 
 /// Parses the process's arguments and runs the command.
 pub fn run() -> ExitCode {
+    pool::on_large_stack(run_command)
+}
+
+fn run_command() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Sequence(arguments) => sequence::run(&arguments),
-        Command::Merge(arguments) => merge::run(&arguments),
+        Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
         Command::Bench(arguments) => bench::run(arguments),
-        Command::Cartoon(arguments) => cartoon::run(&arguments),
-        Command::Noise(arguments) => noise::run(&arguments),
-        Command::Antialias(arguments) => antialias::run(&arguments),
-        Command::MotionBlur(arguments) => motion_blur::run(&arguments),
-        Command::Compare(arguments) => compare::run(&arguments),
-        Command::Info(arguments) => info::run(&arguments),
+        Command::Cartoon(arguments) => all_threads().and_then(|()| cartoon::run(&arguments)),
+        Command::Noise(arguments) => all_threads().and_then(|()| noise::run(&arguments)),
+        Command::Antialias(arguments) => all_threads().and_then(|()| antialias::run(&arguments)),
+        Command::MotionBlur(arguments) => all_threads().and_then(|()| motion_blur::run(&arguments)),
+        Command::Compare(arguments) => all_threads().and_then(|()| compare::run(&arguments)),
+        Command::Info(arguments) => all_threads().and_then(|()| info::run(&arguments)),
     };
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
@@ -93,6 +98,11 @@ pub fn run() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// For commands without a flag for it.
+fn all_threads() -> Result<(), Failure> {
+    pool::start(None)
 }
 
 /// Reads an image of any program, warnings said.

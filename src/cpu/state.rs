@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use crate::accel::Hit;
 use crate::packed::NONE;
+use crate::work::RayCounts;
 
 /// Finished; the results stand in the accumulators.
 pub const STAGE_DONE: u32 = 0;
@@ -79,17 +80,6 @@ pub const COINCIDENCE: f32 = 1e-5;
 
 /// No surface: a ray from the camera.
 pub const SIDE_NONE: u32 = 2;
-
-/// Rays traced, by the paper's kinds.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct RayCounts {
-    pub primary: u32,
-    pub mixed: u32,
-    pub real: u32,
-    pub mixed_shadow: u32,
-    pub real_shadow: u32,
-}
 
 /// Where a ray starts: a vertex, or the camera.
 #[derive(Clone, Copy, Debug)]
@@ -222,7 +212,7 @@ pub struct PathState {
     pub first_hit: FirstHit,
     /// The vertex to be shaded next.
     pub vertex_hit: Hit,
-    pub rays: RayCounts,
+    pub rays: RayCounts<u32>,
 }
 
 /// A ray that met nothing.

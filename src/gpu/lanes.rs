@@ -3,11 +3,12 @@
 
 use std::collections::BTreeMap;
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck::{AnyBitPattern, Pod, Zeroable};
 
 use super::kernel::Kernel;
-use super::{GpuDevice, GpuError, PixelWork};
+use super::{GpuDevice, GpuError};
 use crate::film::{GuideSums, PixelSums};
+use crate::work::{PixelWork, RayCounts};
 
 /// Twin of the shader's `Batch`.
 #[repr(C)]
@@ -26,13 +27,12 @@ pub struct Batch {
 
 /// What the device counts while a batch runs.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, AnyBitPattern)]
 pub struct Counters {
     pub lanes_in: u32,
     pub lanes_out: u32,
     pub steps: u32,
-    /// Primary, mixed, real, mixed shadow, real shadow.
-    pub rays: [u32; 5],
+    pub rays: RayCounts<u32>,
 }
 
 pub const COUNTERS_BYTES: u64 = size_of::<Counters>() as u64;
@@ -41,15 +41,15 @@ const GUIDE_BYTES: u64 = size_of::<GuideSums>() as u64;
 const WORK_BYTES: u64 = size_of::<PixelWork>() as u64;
 
 /// Bind group of the parts of a sample's state.
-const PARTS_GROUP: u32 = 2;
+pub(super) const PARTS_GROUP: u32 = 2;
 
-/// Bytes of one sample in the array of each part of its state that `kernels` use, by binding.
-pub fn state_parts(kernels: &[Kernel]) -> BTreeMap<u32, u64> {
+/// Bytes of one sample in the array of each part of its state that `kernels` use, by name.
+pub fn state_parts(kernels: &[Kernel]) -> BTreeMap<String, u64> {
     kernels
         .iter()
         .flat_map(Kernel::bindings)
         .filter(|binding| binding.group == PARTS_GROUP)
-        .map(|binding| (binding.binding, u64::from(binding.stride)))
+        .map(|binding| (binding.name.clone(), u64::from(binding.stride)))
         .collect()
 }
 
@@ -59,8 +59,8 @@ pub struct Lanes {
     pub with_guides: bool,
     pub batch: wgpu::Buffer,
     pub work: wgpu::Buffer,
-    /// By binding.
-    pub parts: BTreeMap<u32, wgpu::Buffer>,
+    /// By name.
+    pub parts: BTreeMap<String, wgpu::Buffer>,
     pub queues: [wgpu::Buffer; 2],
     pub counters: wgpu::Buffer,
     pub indirect: wgpu::Buffer,
@@ -88,7 +88,7 @@ impl Lanes {
     pub fn new(
         gpu: &GpuDevice,
         capacity: usize,
-        parts: &BTreeMap<u32, u64>,
+        parts: &BTreeMap<String, u64>,
         with_guides: bool,
     ) -> Result<Self, GpuError> {
         use wgpu::BufferUsages as Usage;
@@ -116,7 +116,7 @@ impl Lanes {
             work: make("work", WORK_BYTES * count, filled),
             parts: parts
                 .iter()
-                .map(|(&binding, bytes)| (binding, make("state", bytes * count, Usage::STORAGE)))
+                .map(|(name, bytes)| (name.clone(), make(name, bytes * count, Usage::STORAGE)))
                 .collect(),
             queues: [queue(), queue()],
             counters: make("counters", COUNTERS_BYTES, both),
@@ -138,21 +138,18 @@ impl Lanes {
         })
     }
 
-    /// The buffer of a binding of groups 1 and 2; `parity` says which queue is read.
-    pub fn get(&self, group: u32, binding: u32, parity: usize) -> Option<&wgpu::Buffer> {
-        if group == PARTS_GROUP {
-            return self.parts.get(&binding);
-        }
-        Some(match binding {
-            0 => &self.batch,
-            1 => &self.work,
-            2 => &self.queues[parity],
-            3 => &self.queues[1 - parity],
-            4 => &self.counters,
-            5 => &self.indirect,
-            6 => &self.pixel_sums,
-            7 => &self.guide_sums,
-            _ => return None,
+    /// The buffer of that name in `shaders/gpu/lanes.wgsl` or `shaders/cpu/state.wgsl`; `parity` says which queue is read.
+    pub fn get(&self, name: &str, parity: usize) -> Option<&wgpu::Buffer> {
+        Some(match name {
+            "batch" => &self.batch,
+            "work" => &self.work,
+            "queue_in" => &self.queues[parity],
+            "queue_out" => &self.queues[1 - parity],
+            "counters" => &self.counters,
+            "indirect" => &self.indirect,
+            "pixel_sums" => &self.pixel_sums,
+            "guide_sums" => &self.guide_sums,
+            part => return self.parts.get(part),
         })
     }
 
@@ -167,6 +164,10 @@ impl Lanes {
         write(&self.work, bytemuck::cast_slice(work));
         write(&self.pixel_sums, bytemuck::cast_slice(sums));
         write(&self.guide_sums, bytemuck::cast_slice(guides));
+    }
+
+    pub fn clear_counters(&self, gpu: &GpuDevice) {
+        (gpu.queue).write_buffer(&self.counters, 0, &[0; COUNTERS_BYTES as usize]);
     }
 
     pub fn copy_counters(&self, encoder: &mut wgpu::CommandEncoder) {

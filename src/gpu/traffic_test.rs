@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::kernel::reflect_bindings;
+use super::lanes::PARTS_GROUP;
 use super::profile::KERNELS;
 use super::{Composer, Features};
 
@@ -21,10 +22,8 @@ fn parts(kernel: &str, paper: bool) -> BTreeMap<String, u32> {
     reflect_bindings(&wgsl)
         .expect("valid")
         .into_iter()
-        .filter_map(|binding| {
-            let part = binding.name.strip_prefix("cpu_state_")?;
-            Some((part.to_owned(), binding.stride))
-        })
+        .filter(|binding| binding.group == PARTS_GROUP)
+        .map(|binding| (binding.name, binding.stride))
         .collect()
 }
 
@@ -84,7 +83,10 @@ fn a_step_moves_as_many_bytes_as_the_documentation_says() {
     }
     let state = [false, true].map(state_bytes);
     let sentence = format!("{} bytes, with `paper` {}", state[0], state[1]);
-    assert!(DOC.contains(&sentence), "docs/architecture.md lacks: {sentence}");
+    assert!(
+        DOC.contains(&sentence),
+        "docs/architecture.md lacks: {sentence}"
+    );
     *size.get_mut("path_rays").expect("is bound") += 4;
     let wrong = rows(&size);
     assert!(!DOC.contains(&wrong[2]), "control: {}", wrong[2]);

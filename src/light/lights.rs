@@ -50,7 +50,7 @@ pub fn light_select(scene: &PackedScene, u: f32, coin: f32) -> u32 {
     if coin < light.alias_threshold {
         index
     } else {
-        light.alias
+        light.alias_light
     }
 }
 

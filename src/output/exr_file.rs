@@ -195,8 +195,13 @@ pub(super) fn write_layers<'a>(
     write_channels(target, picture.width, picture.height, channels, attributes)
 }
 
+/// As OpenEXR wants it; the crate's own conversion knows Latin-1 alone and panics beyond.
+fn utf8(text: &str) -> Text {
+    Text::from_bytes_unchecked(SmallVec::from_slice(text.as_bytes()))
+}
+
 pub(super) fn text_value(text: &str) -> AttributeValue {
-    AttributeValue::Text(Text::from(text))
+    AttributeValue::Text(utf8(text))
 }
 
 /// Writes a file of one part.

@@ -1,6 +1,5 @@
 //! Pictures to files: PNG and multilayer EXR, written beside the target and renamed, so that no broken picture is ever left.
 
-mod channels;
 mod exr_file;
 mod film_file;
 mod plain;
@@ -8,7 +7,7 @@ mod png_file;
 mod reference_file;
 mod target;
 
-pub use channels::ChannelFile;
+pub use crate::decode::ChannelFile;
 pub use exr_file::{Metadata, write_exr};
 pub use film_file::{FilmNote, read_film, write_film};
 pub use plain::{write_composite, write_image};

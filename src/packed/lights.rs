@@ -98,7 +98,7 @@ fn blank(kind: u32, side: u32) -> Light {
         side,
         select_pdf: 0.0,
         alias_threshold: 1.0,
-        alias: NONE,
+        alias_light: NONE,
         triangle: NONE,
         pad: [0; 2],
     }
@@ -279,7 +279,7 @@ fn set_probabilities(lights: &mut [Light], powers: &[f64]) {
     while let (Some(&s), Some(&l)) = (small.last(), large.last()) {
         small.pop();
         lights[s].alias_threshold = scaled[s] as f32;
-        lights[s].alias = l as u32;
+        lights[s].alias_light = l as u32;
         scaled[l] -= 1.0 - scaled[s];
         if scaled[l] < 1.0 {
             large.pop();
@@ -288,6 +288,6 @@ fn set_probabilities(lights: &mut [Light], powers: &[f64]) {
     }
     for rest in small.into_iter().chain(large) {
         lights[rest].alias_threshold = 1.0;
-        lights[rest].alias = rest as u32;
+        lights[rest].alias_light = rest as u32;
     }
 }

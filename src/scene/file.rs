@@ -15,6 +15,7 @@ use super::settings::read_settings;
 use super::shutter::{read_camera_motion, read_shutter};
 use super::trajectory::Intrinsics;
 use super::{Photo, Scene, Stages};
+use crate::decode::{MAX_TEXT_BYTES, read_file};
 
 const TABLES: &[&str] = &[
     "photo",
@@ -54,9 +55,9 @@ pub fn load(path: &Path) -> std::result::Result<Scene, SceneError> {
 /// # Errors
 /// As [`load`]; or the intrinsics do not fit the photograph.
 pub fn load_with(path: &Path, given: Given) -> std::result::Result<Scene, SceneError> {
-    let bytes = std::fs::read(path).map_err(|error| SceneError::Unreadable {
+    let bytes = read_file(path, MAX_TEXT_BYTES).map_err(|reason| SceneError::Unreadable {
         path: path.to_path_buf(),
-        reason: error.to_string(),
+        reason,
     })?;
     read_scene(&Source::new(path, bytes)?, given)
 }

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::error::Result;
-use super::image_file::{ImageFile, Pixels, decode_image, read_image};
 use super::reader::{Node, Table};
 use super::srgb::{decode8, decode16};
 use super::{EncodedPhoto, Exposure, Photo};
+use crate::decode::{ImageFile, Pixels, decode_image, read_image};
 
 const KEYS: &[&str] = &["image", "exposure_ev"];
 

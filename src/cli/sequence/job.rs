@@ -14,7 +14,9 @@ use crate::cli::render::say_idle;
 use crate::cli::{Failure, Outcome, interrupt, print, say};
 use crate::output::{check_writable, write_text};
 use crate::packed::next_anchor;
-use crate::renderer::{Budget, FrameEdit, PreviousView, RayTotals, Renderer, RendererOptions};
+use crate::renderer::{
+    Budget, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
+};
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{
     BackendChoice, Camera, Exposure, Lens, MotionBlurMethod, Scene, fingerprint_of,
@@ -68,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         started: None,
         frames: Frames::default(),
         seconds: Seconds::default(),
-        rays: RayTotals::default(),
+        rays: RayCounts::default(),
         non_finite_samples: 0,
     };
     let outcome = loop {
@@ -130,7 +132,7 @@ struct Sequence<'a> {
     started: Option<Started>,
     frames: Frames,
     seconds: Seconds,
-    rays: RayTotals,
+    rays: RayCounts,
     non_finite_samples: u64,
 }
 
@@ -224,7 +226,7 @@ impl Sequence<'_> {
                 without: self.arguments.flags.without(),
                 ..RendererOptions::default()
             };
-            let renderer = Renderer::new(scene, options)?;
+            let renderer = Renderer::new(scene, options, &Watcher::none())?;
             say_idle(&renderer, None);
             let seconds = renderer.seconds();
             self.seconds.compile += seconds.compile;
@@ -240,18 +242,21 @@ impl Sequence<'_> {
             return Ok(true);
         };
         let begin = Instant::now();
-        renderer.set_frame(FrameEdit {
-            photo: Some(frame.photo.clone()),
-            camera,
-            lens,
-            camera_path: near,
-            time_secs,
-            seed: started.seed.wrapping_add(name.number),
-            anchor: started.anchor,
-        })?;
+        renderer.set_frame(
+            FrameEdit {
+                photo: Some(frame.photo.clone()),
+                camera,
+                lens,
+                camera_path: near,
+                time_secs,
+                seed: started.seed.wrapping_add(name.number),
+                anchor: started.anchor,
+            },
+            &Watcher::none(),
+        )?;
         self.seconds.edit += begin.elapsed().as_secs_f64();
         let begin = Instant::now();
-        renderer.advance(Budget::Complete, interrupted, &mut |_| ())?;
+        renderer.advance(Budget::Complete, &Watcher::none().cancelled_by(interrupted))?;
         self.seconds.render += begin.elapsed().as_secs_f64();
         if interrupted() {
             return Ok(false);

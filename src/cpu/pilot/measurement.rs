@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::blocks::Blocks;
 use crate::cpu::estimator::{advance, begin_sample};
 use crate::cpu::request::answer;
-use crate::cpu::state::{PathState, RayCounts, STAGE_DONE};
+use crate::cpu::state::{PathState, STAGE_DONE};
 use crate::film::is_unusable;
 use crate::math::{hash_combine, hash_u32};
 use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene};
@@ -108,12 +108,5 @@ fn add_pixel(scene: &PackedScene, pixel: u32, index: u32, moments: &mut BlockMom
 }
 
 fn cost_of(st: &PathState) -> f32 {
-    let RayCounts {
-        primary: _,
-        mixed,
-        real,
-        mixed_shadow,
-        real_shadow,
-    } = st.rays;
-    (mixed + real + mixed_shadow + real_shadow) as f32 + COST_OF_A_SAMPLE
+    st.rays.traced() as f32 + COST_OF_A_SAMPLE
 }

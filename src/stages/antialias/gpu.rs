@@ -1,4 +1,4 @@
-//! Host side of `shaders/stages/antialias.wgsl`.
+//! Host side of `shaders/stages/antialias/gpu.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -8,9 +8,12 @@ use crate::gpu::GpuError;
 use crate::stages::GpuStages;
 use crate::stages::antialias::is_binary;
 
+/// Of the shaders.
+const MODULE: &str = "stages::antialias::gpu";
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(in crate::stages) struct AntialiasParams {
+struct AntialiasParams {
     width: u32,
     height: u32,
     beta: f32,
@@ -44,12 +47,12 @@ impl GpuStages {
         let mut encoder = self.encoder();
         self.dispatch(
             &mut encoder,
-            "stage_antialias",
+            (MODULE, "stage_antialias"),
             &[
-                (0, 0, &params),
-                (0, 1, &source),
-                (0, 2, &mask),
-                (0, 3, &result),
+                ("params", &params),
+                ("source", &source),
+                ("mask", &mask),
+                ("picture", &result),
             ],
             (picture.width, picture.height),
         )?;

@@ -1,4 +1,5 @@
-//! A picture as three planes, Y, U and V, with columns repeated at both ends so that a filter's window never leaves a row.
+//! A picture as three planes, Y, U and V, with columns repeated at both ends so that a filter's window never leaves a row. Twin of
+//! `shaders/stages/cartoon/planes.wgsl`, which computes Y, U and V where they are read.
 
 use rayon::prelude::*;
 

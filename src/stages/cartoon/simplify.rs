@@ -1,4 +1,4 @@
-//! The simplified colour picture: equations 1 to 3 on a shrunk picture.
+//! The simplified colour picture: equations 1 to 3 on a shrunk picture. Twin of `shaders/stages/cartoon/simplify.wgsl`.
 
 use super::planes::{PAD, Planes, yuv_from_rgb};
 use crate::stages::EncodedImage;
@@ -19,14 +19,17 @@ fn covers(large: usize, small: usize) -> Vec<Cover> {
             let (begin, end) = (index * large, (index + 1) * large);
             let first = begin / small;
             let weights = (first..end.div_ceil(small))
-                .map(|pixel| {
-                    let overlap = end.min((pixel + 1) * small) - begin.max(pixel * small);
-                    overlap as f32 / large as f32
-                })
+                .map(|pixel| overlap(index, pixel, large, small))
                 .collect();
             Cover { first, weights }
         })
         .collect()
+}
+
+/// Share of part `part` of `small` that lies in pixel `pixel` of `large`.
+fn overlap(part: usize, pixel: usize, large: usize, small: usize) -> f32 {
+    let covered = ((part + 1) * large).min((pixel + 1) * small) - (part * large).max(pixel * small);
+    covered as f32 / large as f32
 }
 
 /// The area average at `width` x `height`, or at the picture's own size where that is smaller.

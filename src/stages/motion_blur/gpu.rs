@@ -1,4 +1,4 @@
-//! Host side of `shaders/stages/copies.wgsl`.
+//! Host side of `shaders/stages/motion_blur/gpu.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -6,9 +6,12 @@ use super::Copies;
 use crate::gpu::GpuError;
 use crate::stages::GpuStages;
 
+/// Of the shaders.
+const MODULE: &str = "stages::motion_blur::gpu";
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(in crate::stages) struct CopiesParams {
+struct CopiesParams {
     width: u32,
     height: u32,
     count: u32,
@@ -50,8 +53,8 @@ impl GpuStages {
             let layer = self.array("layer", layer.as_flattened())?;
             self.dispatch(
                 &mut encoder,
-                "stage_copies",
-                &[(0, 0, &params), (0, 1, &layer), (0, 2, &result)],
+                (MODULE, "stage_copies"),
+                &[("params", &params), ("layer", &layer), ("canvas", &result)],
                 (width, height),
             )?;
         }

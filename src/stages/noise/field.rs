@@ -1,5 +1,5 @@
 //! Normal deviates for every pixel of every frame, drawn by hash and correlated as the camera's noise is. Twin of
-//! `shaders/stages/noise/mod.wgsl`.
+//! `shaders/stages/noise/field.wgsl`.
 
 use std::ops::Range;
 
@@ -110,8 +110,8 @@ impl<'a> FieldBand<'a> {
         }
     }
 
-    /// Row `y`, by channel.
-    pub fn row(&self, y: usize) -> [Vec<f32>; 3] {
+    /// Row `y` of the deviates, by channel, correlated by the kernels.
+    pub fn correlated(&self, y: usize) -> [Vec<f32>; 3] {
         let first = y - self.first_row;
         if self.field.kernels.is_empty() {
             return self.white[first].clone();
