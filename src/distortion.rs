@@ -6,11 +6,15 @@
 
 use std::ops::{Add, Mul};
 
+use crate::shared::shared;
+
 /// k1 k2 p1 p2 k3.
 pub type Coefficients<T> = [T; 5];
 
-/// Newton steps of [`undistort_fast`]; `scene::projection::check_distortion` proves them enough for a camera.
-const UNDISTORT_STEPS: u32 = 8;
+shared! {
+    /// Newton steps of [`undistort_fast`]; `scene::projection::check_distortion` proves them enough for a camera.
+    const UNDISTORT_STEPS: u32 = 8;
+}
 
 /// f32 and f64.
 pub trait Real: Copy + From<f32> + Add<Output = Self> + Mul<Output = Self> {}

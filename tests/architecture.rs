@@ -140,7 +140,10 @@ impl Paths<'_> {
             }
             syn::UseTree::Glob(_) => self.0.globs.push(before.to_vec()),
             syn::UseTree::Group(group) => {
-                group.items.iter().for_each(|tree| self.import(tree, before));
+                group
+                    .items
+                    .iter()
+                    .for_each(|tree| self.import(tree, before));
             }
         }
     }
@@ -218,7 +221,7 @@ fn definition(modules: &Crate, from: &Module, path: &[String], depth: u32) -> Op
     };
     let mut rest = rest;
     while let Some((_, after)) = rest.split_first().filter(|(first, _)| *first == "super") {
-            at.pop();
+        at.pop();
         rest = after;
     }
     named(modules, &at, rest, depth)
@@ -273,7 +276,7 @@ fn arrows(modules: &Crate) -> BTreeSet<Arrow> {
 }
 
 /// Layers from the ground up: modules of a line know those of lines before, and nothing of each other.
-fn layers(page: &str) -> Vec<Vec<String>> {
+fn layers(page: &str) -> Vec<Vec<Module>> {
     let section = page
         .split_once("<!-- layers -->")
         .and_then(|(_, rest)| rest.split_once("<!-- end -->"))
@@ -285,54 +288,79 @@ fn layers(page: &str) -> Vec<Vec<String>> {
     cells
         .map(|row| {
             let modules = row.split('|').nth(1).unwrap_or("");
-            let names = modules.split([',', ' ', '`']).filter(|name| !name.is_empty());
-            names.map(str::to_owned).collect()
+            let names = modules
+                .split([',', ' ', '`'])
+                .filter(|name| !name.is_empty());
+            names.map(module).collect()
         })
         .collect()
 }
 
-/// What is wrong with the arrows between top-level modules, a line each.
-fn upward(modules: &Crate, arrows: &BTreeSet<Arrow>, layers: &[Vec<String>]) -> Vec<String> {
-    let height = |name: &String| layers.iter().position(|layer| layer.contains(name));
+/// What is wrong with the arrows between the listed modules, a line each.
+fn upward(modules: &Crate, arrows: &BTreeSet<Arrow>, layers: &[Vec<Module>]) -> Vec<String> {
+    // Of a module and one inside of it that is listed too, the inner counts.
+    let listed = |of: &Module| {
+        let all = layers.iter().enumerate();
+        let all = all.flat_map(|(height, layer)| layer.iter().map(move |name| (height, name)));
+        let around = all.filter(|(_, name)| of.starts_with(name));
+        around.max_by_key(|(_, name)| name.len())
+    };
     let mut problems = Vec::new();
-    let root = modules.get(&Module::new()).expect("the crate has a root");
-    let tops = root.names.iter().filter(|(_, kind)| matches!(kind, Name::Module));
-    let tops: BTreeSet<&String> = tops.map(|(name, _)| name).collect();
-    let listed: BTreeSet<&String> = layers.iter().flatten().collect();
-    for name in tops.symmetric_difference(&listed) {
-        problems.push(format!("{name} stands in src/lib.rs or in the table of layers, not in both"));
+    for module in modules.keys().filter(|module| !module.is_empty()) {
+        if listed(module).is_none() {
+            problems.push(format!("{} stands in no layer", module.join("::")));
+        }
+    }
+    for module in layers.iter().flatten() {
+        if !modules.contains_key(module) {
+            problems.push(format!("there is no {}", module.join("::")));
+        }
     }
     for Arrow { from, to } in arrows {
-        let (Some(user), Some(used)) = (from.first(), to.first()) else {
+        // The root hands on names; it may know all.
+        let (Some((height, user)), Some((used_height, used))) = (listed(from), listed(to)) else {
             continue;
         };
-        if user != used && height(user) <= height(used) {
+        if user != used && height <= used_height {
             problems.push(format!("{} uses {}", from.join("::"), to.join("::")));
         }
     }
     problems
 }
 
-/// The arrows of files that need each other: what is left when files that need no other, and those that no other needs, are taken away in turn.
+/// The arrows along which files need each other.
 fn circles(arrows: &BTreeSet<Arrow>) -> Vec<String> {
-    let mut left: Vec<&Arrow> = arrows.iter().collect();
-    loop {
-        let users: BTreeSet<&Module> = left.iter().map(|arrow| &arrow.from).collect();
-        let used: BTreeSet<&Module> = left.iter().map(|arrow| &arrow.to).collect();
-        let before = left.len();
-        left.retain(|arrow| used.contains(&arrow.from) && users.contains(&arrow.to));
-        if left.len() == before {
-            break;
-        }
+    let mut used_by: BTreeMap<&Module, Vec<&Module>> = BTreeMap::new();
+    for Arrow { from, to } in arrows {
+        used_by.entry(from).or_default().push(to);
     }
-    let line = |arrow: &&Arrow| format!("{} -> {}", arrow.from.join("::"), arrow.to.join("::"));
-    left.iter().map(line).collect()
+    let leads_to = |start: &Module, end: &Module| {
+        let (mut seen, mut next) = (BTreeSet::new(), vec![start]);
+        while let Some(module) = next.pop() {
+            if module == end {
+                return true;
+            }
+            if seen.insert(module) {
+                next.extend(used_by.get(module).into_iter().flatten());
+            }
+        }
+        false
+    };
+    let in_circle = arrows
+        .iter()
+        .filter(|arrow| leads_to(&arrow.to, &arrow.from));
+    let line = |arrow: &Arrow| format!("{} -> {}", arrow.from.join("::"), arrow.to.join("::"));
+    in_circle.map(line).collect()
 }
 
 fn sources_of(folder: &Path, module: &Module, sources: &mut BTreeMap<Module, String>) {
     for entry in std::fs::read_dir(folder).expect("src/ can be read") {
         let path = entry.expect("src/ can be read").path();
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = path
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
         let child = [module.as_slice(), std::slice::from_ref(&name)].concat();
         if path.is_dir() {
             sources_of(&path, &child, sources);
@@ -351,7 +379,7 @@ fn this_crate() -> BTreeMap<Module, String> {
     sources
 }
 
-fn this_page() -> Vec<Vec<String>> {
+fn this_page() -> Vec<Vec<Module>> {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/architecture.md");
     layers(&std::fs::read_to_string(page).expect("docs/architecture.md can be read"))
 }
@@ -365,7 +393,11 @@ fn no_module_uses_one_above_it() {
     let layers = this_page();
     let modules = read(&this_crate());
     let arrows = arrows(&modules);
-    assert!(arrows.len() > 200, "the sources were read: {}", arrows.len());
+    assert!(
+        arrows.len() > 200,
+        "the sources were read: {}",
+        arrows.len()
+    );
     let problems = upward(&modules, &arrows, &layers);
     assert!(problems.is_empty(), "{}", problems.join("\n"));
 
@@ -381,7 +413,10 @@ fn no_module_uses_one_above_it() {
         math.push_str(planted);
         let modules = read(&sources);
         let problems = upward(&modules, &self::arrows(&modules), &layers);
-        assert!(problems.iter().any(|p| p.starts_with("math uses renderer")), "{planted}: {problems:?}");
+        assert!(
+            problems.iter().any(|p| p.starts_with("math uses renderer")),
+            "{planted}: {problems:?}"
+        );
     }
 }
 
@@ -398,12 +433,68 @@ fn no_file_needs_one_that_needs_it() {
             ("a::b", "use super::{A, c::C}; pub struct B(A, C);"),
             ("a::c", second),
         ];
-        let mut sources: BTreeMap<Module, String> =
-            sources.iter().map(|(name, text)| (module(name), (*text).to_owned())).collect();
+        let mut sources: BTreeMap<Module, String> = sources
+            .iter()
+            .map(|(name, text)| (module(name), (*text).to_owned()))
+            .collect();
         sources.insert(Module::new(), "mod a;".to_owned());
         self::circles(&self::arrows(&read(&sources)))
     };
     assert_eq!(circle("use super::A; pub struct C;"), [""; 0]);
-    assert_eq!(circle("use super::B; pub struct C;"), ["a::b -> a::c", "a::c -> a::b"]);
-    assert_eq!(circle("#[cfg(test)] mod tests { use super::super::B; } pub struct C;"), [""; 0]);
+    assert_eq!(
+        circle("use super::B; pub struct C;"),
+        ["a::b -> a::c", "a::c -> a::b"]
+    );
+    assert_eq!(
+        circle("#[cfg(test)] mod tests { use super::super::B; } pub struct C;"),
+        [""; 0]
+    );
+}
+
+/// Names that lib.rs shows on purpose, and modules that it shows by mistake.
+fn face(root: &str) -> (Vec<String>, Vec<String>) {
+    let file = syn::parse_file(root).expect("src/lib.rs is Rust");
+    let mut contents = Contents::default();
+    let mut open = Vec::new();
+    for item in &file.items {
+        match item {
+            syn::Item::Use(item) if matches!(item.vis, syn::Visibility::Public(_)) => {
+                Paths(&mut contents).import(&item.tree, &[]);
+            }
+            syn::Item::Mod(item) if matches!(item.vis, syn::Visibility::Public(_)) => {
+                let is_hidden = |attribute: &syn::Attribute| match &attribute.meta {
+                    syn::Meta::List(list) => {
+                        list.path.is_ident("doc") && list.tokens.to_string() == "hidden"
+                    }
+                    _ => false,
+                };
+                if !item.attrs.iter().any(is_hidden) {
+                    open.push(item.ident.to_string());
+                }
+            }
+            _ => {}
+        }
+    }
+    (contents.names.into_keys().collect(), open)
+}
+
+#[test]
+fn the_library_shows_about_forty_names() {
+    let sources = this_crate();
+    let root = &sources[&Module::new()];
+    let (names, open) = face(root);
+    assert!(
+        (35..=50).contains(&names.len()),
+        "{}: {names:?}",
+        names.len()
+    );
+    assert_eq!(open, [""; 0], "hidden from the docs");
+
+    let planted = format!("{root}\npub mod planted;\npub use planted::Planted;");
+    let (more, open) = face(&planted);
+    assert_eq!(
+        (more.len(), open),
+        (names.len() + 1, vec!["planted".to_owned()]),
+        "control"
+    );
 }

@@ -1,11 +1,12 @@
 //! Composites against converged references that an independent renderer, Mitsuba 3, made of the same scenes (docs/accuracy.md).
 
-use std::path::Path;
 use std::sync::Arc;
 
 use mixray::film::Picture;
 use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{BackendChoice, EncodedPhoto, LightKind, Material, Photo, Scene};
+
+use crate::support::{largest, root};
 
 /// Runs of a comparison: their spread is the standard error.
 const RUNS: u32 = 4;
@@ -74,10 +75,6 @@ impl Reference {
             .map(|((added, mask), ic)| added + (1.0 - mask) * ic)
             .collect()
     }
-}
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
 fn grey(linear: &[[f32; 3]]) -> Vec<f64> {
@@ -206,7 +203,7 @@ fn compare(
         weighted_error: weighted.error / weighted.truth,
         weighted_standard_error: weighted.variance.sqrt() / weighted.truth,
         z_rms: (zs.iter().map(|z| z * z).sum::<f64>() / zs.len() as f64).sqrt(),
-        z_largest: zs.iter().fold(0.0, |a: f64, z| a.max(z.abs())),
+        z_largest: largest(zs.iter().copied()),
     }
 }
 

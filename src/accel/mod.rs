@@ -24,9 +24,9 @@ mod stack;
 mod trace;
 mod wide;
 
-#[cfg(test)]
+#[cfg(all(test, feature = "bench"))]
 mod gpu_tests;
-#[cfg(test)]
+#[cfg(all(test, feature = "bench"))]
 mod tests;
 
 use std::sync::{Mutex, OnceLock};

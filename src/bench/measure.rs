@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use cpu_time::ProcessTime;
+use crate::clock::ProcessorTime;
 
 use super::{Errors, Method, Row, Run, Truth};
 use crate::film::Picture;
@@ -254,7 +254,7 @@ impl Subject {
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<(Sample, Picture), RenderError> {
         let before = self.renderer.rays();
-        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        let (wall, cpu) = (Instant::now(), ProcessorTime::now());
         let samples = rays_per_pixel.unwrap_or(self.rays_per_pixel);
         self.renderer.set_samples(samples, seed, &Watcher::none())?;
         let setup_secs = wall.elapsed().as_secs_f64();
@@ -268,7 +268,7 @@ impl Subject {
                 .advance(Budget::Complete, &Watcher::none().cancelled_by(cancelled))?,
         }
         let picture = self.renderer.picture();
-        let (wall_secs, cpu_secs) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        let (wall_secs, cpu_secs) = (wall.elapsed().as_secs_f64(), cpu.elapsed_secs());
         let film = self.renderer.film();
         let sample = Sample {
             seed,

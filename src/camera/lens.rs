@@ -7,14 +7,8 @@ use glam::Vec3;
 
 use super::shutter::{CameraPose, camera_pose};
 use crate::distortion::{Coefficients, distort, undistort_fast};
-use crate::math::{dot3, normalize3, sincos_2pi};
-use crate::packed::Frame;
-
-/// `Frame::aperture_shape`; 3 and above is a number of blades.
-pub const APERTURE_DISC: u32 = 0;
-pub const APERTURE_SQUARE: u32 = 1;
-
-const INV_TAU: f32 = 0.159_154_94;
+use crate::math::{INV_TAU, dot3, normalize3, sincos_2pi};
+use crate::packed::{APERTURE_DISC, APERTURE_SQUARE, Frame};
 
 /// Anchor-relative origin in metres, unit direction.
 #[derive(Clone, Copy, Debug, PartialEq)]

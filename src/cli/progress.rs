@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
+use super::pool;
+use super::terminal::escaped;
 use crate::renderer::{Phase, Progress};
 
 /// What a render does, and the share of it that is done.
@@ -23,7 +25,7 @@ impl Bar {
             let bar = ProgressBar::new(PARTS);
             set_template(&bar, "{prefix} {wide_bar} {percent:>3}%{msg}");
             bar.set_prefix(doing);
-            bar.enable_steady_tick(Duration::from_millis(200));
+            tick(&bar, 200);
             bar
         });
         Self { bar, unit }
@@ -76,14 +78,14 @@ impl Steps {
         }
         let bar = ProgressBar::new(count);
         set_template(&bar, "{bar:24} {pos}/{len}, {elapsed}: {wide_msg}");
-        bar.enable_steady_tick(Duration::from_millis(500));
+        tick(&bar, 500);
         Self(Some(bar))
     }
 
     /// Something within a step.
     pub(super) fn say(&self, message: &str) {
         if let Some(bar) = &self.0 {
-            bar.set_message(message.to_owned());
+            bar.set_message(escaped(message));
         }
     }
 
@@ -98,6 +100,13 @@ impl Steps {
         if let Some(bar) = &self.0 {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// Moves on its own, where a thread can be made for that.
+fn tick(bar: &ProgressBar, milliseconds: u64) {
+    if pool::can_spawn() {
+        bar.enable_steady_tick(Duration::from_millis(milliseconds));
     }
 }
 

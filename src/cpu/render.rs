@@ -101,8 +101,8 @@ impl Tile<'_> {
         let sums = &mut self.sums[work.pixel as usize - self.first_pixel];
         for index in work.first..work.end {
             let st = run(scene, begin_sample(scene, work.pixel, index, true), rays);
-            let real = st.radiance * scene.frame.exposure_scale;
-            pixel_add_real(sums, index, st.mask != 0, real);
+            let real = st.result.radiance * scene.frame.exposure_scale;
+            pixel_add_real(sums, index, st.result.mask != 0, real);
         }
     }
 }
@@ -117,19 +117,19 @@ fn main_sample(
 ) {
     let st = run(scene, begin_sample(scene, pixel, index, false), rays);
     let scale = scene.frame.exposure_scale;
-    let is_virtual = st.mask != 0;
+    let is_virtual = st.result.mask != 0;
     let (contribution, real) = if scene.frame.estimator == ESTIMATOR_PAPER {
         let real = st.radiance_real * scale;
         (
             if is_virtual {
-                st.radiance * scale
+                st.result.radiance * scale
             } else {
-                (st.radiance - st.radiance_real) * scale
+                (st.result.radiance - st.radiance_real) * scale
             },
             Some(real),
         )
     } else {
-        (st.radiance * scale, None)
+        (st.result.radiance * scale, None)
     };
     sums.add(
         index,
@@ -141,19 +141,19 @@ fn main_sample(
         },
     );
     if let Some(sums) = guide
-        && st.depth_m.is_finite()
+        && st.first_hit.depth_m.is_finite()
     {
         let guide = Guide {
-            depth_m: st.depth_m,
-            normal: st.normal,
-            albedo: st.albedo,
+            depth_m: st.first_hit.depth_m,
+            normal: st.first_hit.normal,
+            albedo: st.first_hit.albedo,
         };
         guide_add(sums, guide.depth_m, guide.normal, guide.albedo);
     }
 }
 
 fn run(scene: &PackedScene, mut st: PathState, rays: &mut RayCounts) -> PathState {
-    while st.stage != STAGE_DONE {
+    while st.path.stage != STAGE_DONE {
         answer(scene, &mut st);
         advance(scene, &mut st);
     }
@@ -168,5 +168,5 @@ pub fn render_first_hit(scene: &PackedScene, pixel: u32, index: u32) -> (Vec3, V
         begin_sample(scene, pixel, index, true),
         &mut RayCounts::default(),
     );
-    (st.radiance, st.albedo)
+    (st.result.radiance, st.first_hit.albedo)
 }

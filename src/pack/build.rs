@@ -10,9 +10,10 @@ use crate::accel::{AccelError, WorldBvh};
 use crate::light::environment::environment_table;
 use crate::packed::materials::{MaterialKey, MaterialTable};
 use crate::packed::{
-    FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER, FRAME_SHUTTER_ORDERED, Frame,
-    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL,
-    PackedScene, PixelInfo, Triangle, Vertex,
+    ESTIMATOR_DIRECT, ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER,
+    FRAME_SHUTTER_ORDERED, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE,
+    PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, SAMPLER_CMJ, SAMPLER_JITTERED,
+    SAMPLER_SOBOL, Triangle, Vertex,
 };
 use crate::scene::{
     EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind, Scene, Side,
@@ -133,13 +134,13 @@ impl PackedScene {
         frame.max_bounces = settings.max_bounces;
         frame.clamp_indirect = settings.clamp_indirect.min(f32::MAX);
         frame.sampler = match settings.sampler {
-            SamplerKind::Jittered => 0,
-            SamplerKind::Cmj => 1,
-            SamplerKind::Sobol => 2,
+            SamplerKind::Jittered => SAMPLER_JITTERED,
+            SamplerKind::Cmj => SAMPLER_CMJ,
+            SamplerKind::Sobol => SAMPLER_SOBOL,
         };
         frame.estimator = match settings.estimator {
-            Estimator::Direct => 0,
-            Estimator::Paper => 1,
+            Estimator::Direct => ESTIMATOR_DIRECT,
+            Estimator::Paper => ESTIMATOR_PAPER,
         };
         frame.exposure_scale = match settings.exposure {
             Exposure::Ev(ev) => ev.exp2() as f32,

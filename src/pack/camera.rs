@@ -2,8 +2,7 @@
 
 use glam::DVec3;
 
-use crate::camera::lens::{APERTURE_DISC, APERTURE_SQUARE};
-use crate::packed::Frame;
+use crate::packed::{APERTURE_DISC, APERTURE_SQUARE, Frame};
 use crate::scene::{Aperture, Camera, Lens};
 
 /// Fills the camera and lens fields of `frame`. Positions become relative to `anchor` (world, metres), subtracted in f64.

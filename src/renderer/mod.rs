@@ -30,10 +30,10 @@ mod films;
 mod frames;
 mod goal;
 mod moving;
+mod needs;
 mod photo_albedo;
 mod picture_motion;
 mod prepare;
-mod series;
 mod shown;
 mod skips;
 mod stats;
@@ -79,6 +79,8 @@ pub struct RendererOptions {
 
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
+    #[error(transparent)]
+    Memory(#[from] crate::memory::Shortage),
     #[error(transparent)]
     Pack(#[from] crate::pack::PackError),
     #[error(transparent)]
@@ -173,7 +175,9 @@ impl Renderer {
         if first_sample >= end_sample || end_sample > total {
             return Err(RenderError::SampleRange(first_sample, end_sample, total));
         }
+        needs::ensure_scene(&scene, options.all_planes)?;
         let packed = packing(watcher, || PackedScene::build(&scene))?;
+        needs::ensure_film(&packed, options.all_planes)?;
         let film = Film::new(
             packed.frame.width,
             packed.frame.height,

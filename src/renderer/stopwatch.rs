@@ -2,19 +2,19 @@
 
 use std::time::Instant;
 
-use cpu_time::ProcessTime;
+use crate::clock::ProcessorTime;
 
 /// Started when made.
 pub(super) struct Stopwatch {
     pub begin: Instant,
-    processor_secs: f64,
+    cpu: ProcessorTime,
 }
 
 impl Stopwatch {
     pub fn start() -> Self {
         Self {
             begin: Instant::now(),
-            processor_secs: processor_secs(),
+            cpu: ProcessorTime::now(),
         }
     }
 
@@ -25,11 +25,6 @@ impl Stopwatch {
 
     /// Seconds of the processors in all of the process's threads.
     pub fn cpu_secs(&self) -> f64 {
-        processor_secs() - self.processor_secs
+        self.cpu.elapsed_secs()
     }
-}
-
-/// Seconds that the processors have spent on the process.
-fn processor_secs() -> f64 {
-    ProcessTime::now().as_duration().as_secs_f64()
 }

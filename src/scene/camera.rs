@@ -1,7 +1,8 @@
 //! `[camera]` and `[lens]`.
 
+use crate::decode::{MAX_PIXELS, MAX_SIDE_PX};
+
 use super::error::Result;
-use super::image_file::{MAX_PIXELS, MAX_SIDE_PX};
 use super::pose::read_camera_pose;
 use super::projection::check_distortion;
 use super::reader::{Node, Table};

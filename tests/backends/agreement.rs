@@ -5,12 +5,13 @@ use std::sync::Arc;
 use mixray::cpu::render::render;
 use mixray::film::{Film, composite};
 use mixray::gpu::{GpuBackend, GpuDevice, harness::test_device};
-use mixray::renderer::{Budget, RayCounts, Renderer, RendererOptions, Watcher, Without};
+use mixray::renderer::{RayCounts, Renderer, RendererOptions, Watcher, Without};
 use mixray::scene::Scene;
 use mixray::work::WorkList;
 
 use super::assets::write_assets;
 use super::scenes::{Case, RAYS};
+use crate::support::largest;
 
 const RELATIVE: f64 = 1e-4;
 const ABSOLUTE: f64 = 1e-5;
@@ -87,12 +88,10 @@ impl Difference {
                 .map(|pixel| film[pixel][plane])
                 .sum()
         };
-        let average = (0..a[0].len())
-            .map(|plane| {
-                let (x, y) = (sum(a, plane), sum(b, plane));
-                (x - y).abs() / x.abs().max(ABSOLUTE * a.len() as f64)
-            })
-            .fold(0.0, f64::max);
+        let average = largest((0..a[0].len()).map(|plane| {
+            let (x, y) = (sum(a, plane), sum(b, plane));
+            (x - y) / x.abs().max(ABSOLUTE * a.len() as f64)
+        }));
         Self {
             outliers,
             pixels: a.len(),
@@ -269,11 +268,4 @@ fn assert_flipped(name: &str, backend: &mut GpuBackend, renderer: &Renderer, pix
         flipped.len() as u32 <= RAYS / 2,
         "{name}: pixel {pixel} differs in samples {flipped:?}"
     );
-}
-
-/// A complete render through the public renderer.
-pub fn complete(renderer: &mut Renderer) {
-    renderer
-        .advance(Budget::Complete, &Watcher::none())
-        .unwrap_or_else(|error| panic!("{error}"));
 }

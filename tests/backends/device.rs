@@ -9,10 +9,11 @@ use mixray::scene::BackendChoice;
 use mixray::work::WorkList;
 
 use super::agreement::{
-    Difference, backend_for, complete, cpu_film, empty_film, gpu_film, load, planes, render_all,
-    render_on, renderer,
+    Difference, backend_for, cpu_film, empty_film, gpu_film, load, planes, render_all, render_on,
+    renderer,
 };
 use super::scenes::{RAYS, case};
+use crate::support::complete;
 
 /// The same samples in other portions.
 fn in_portions(backend: &mut GpuBackend, renderer: &Renderer, ends: &[u32]) -> (Film, RayCounts) {

@@ -13,8 +13,9 @@ use agreement::{
     Difference, assert_agreement, assert_scene_agrees, backend_for, gpu_film, load, planes,
     renderer,
 };
-use assets::shared_data;
 use scenes::{CASES, Case, case};
+
+use crate::support::shared_data;
 
 macro_rules! each_case {
     ($($name:ident,)*) => {

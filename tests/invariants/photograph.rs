@@ -211,7 +211,7 @@ fn lit_pixels_outside_the_shadow_are_the_photograph(backend: BackendChoice) {
     assert!(inside > 15 && outside > 300, "control: there are both");
 }
 
-on_each_backend!(
+on_the_cpu!(
     without_virtual_things_the_photograph_comes_back,
     pixels_off_the_proxy_are_the_photograph,
     lit_pixels_outside_the_shadow_are_the_photograph,

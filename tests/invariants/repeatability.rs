@@ -161,7 +161,7 @@ fn ranges_that_do_not_fit_are_refused(backend: BackendChoice) {
     ));
 }
 
-on_each_backend!(
+on_the_cpu!(
     threads_do_not_matter,
     passes_do_not_matter,
     ranges_merge_to_the_whole,

@@ -307,7 +307,7 @@ fn stopping_at_the_cameras_noise_saves_rays(backend: BackendChoice) {
     assert!(film(None, &both) != even, "control");
 }
 
-on_each_backend!(
+on_the_cpu!(
     out_of_reach_changes_nothing,
     edge_real_changes_nothing,
     virtual_first_changes_nothing,

@@ -152,7 +152,7 @@ fn nothing_to_do_is_done(backend: BackendChoice) {
     assert_eq!(renderer.error(), 0.0);
 }
 
-on_each_backend!(
+on_the_cpu!(
     the_stated_error_predicts_the_true_one,
     it_does_so_where_light_is_rare,
     the_goal_is_met,

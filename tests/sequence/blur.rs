@@ -5,7 +5,8 @@ use mixray::gpu::harness::test_device;
 use mixray::renderer::{Renderer, RendererOptions, Watcher};
 use mixray::scene::BackendChoice;
 
-use super::support::{CAMERA, SQUARE, mask_row, render, scene};
+use super::support::{CAMERA, SQUARE, mask_row, render};
+use crate::support::{largest, scene};
 
 const SHUTTER: &str = "[shutter]\nexposure_secs = 0.5\n[render]\nrays_per_pixel = 256\n";
 /// 0.2 m, or 20 px, in the half second for which the shutter is open.
@@ -30,9 +31,7 @@ fn smeared(x: usize, width: f64) -> f64 {
 }
 
 fn worst(found: &[f64], expected: impl Fn(usize) -> f64) -> f64 {
-    (0..found.len())
-        .map(|x| (found[x] - expected(x)).abs())
-        .fold(0.0, f64::max)
+    largest((0..found.len()).map(|x| found[x] - expected(x)))
 }
 
 #[test]

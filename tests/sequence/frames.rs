@@ -1,7 +1,6 @@
 //! Frames in and out: what passes, what stays put, what is blurred.
 
 use std::io::Write;
-use std::path::Path;
 use std::process::Stdio;
 
 use glam::{DMat4, DVec3};
@@ -9,7 +8,8 @@ use mixray::renderer::{Budget, FrameEdit, Renderer, RendererOptions, Watcher};
 use mixray::scene::projection::project;
 use mixray::scene::trajectory::{CameraPath, FrameName, Trajectory, Views};
 
-use super::support::{BALL, Folder, scene, sequence, y4m};
+use super::support::{BALL, sequence, y4m};
+use crate::support::{Folder, scene, shared_data};
 
 #[test]
 fn null_poses_pass_through_and_are_counted() {
@@ -163,16 +163,13 @@ fn outline(eye: DVec3, centre: DVec3, radius: f64) -> Vec<DVec3> {
 /// The renderer's own arithmetic sees known points of the webcam videos where their poses do.
 #[test]
 fn known_points_of_the_webcam_videos_are_where_the_poses_put_them() {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     for (name, posed) in [
         ("webcam_chessboard_video", 109),
         ("webcam_marker_grid_video", 325),
     ] {
-        let path = data.join(name).join("trajectory.json");
-        if !path.exists() {
-            eprintln!("SKIPPED: {} is absent", path.display());
+        let Some(path) = shared_data(&format!("{name}/trajectory.json")) else {
             return;
-        }
+        };
         let folder = Folder::new();
         let trajectory = Trajectory::read(&path).expect("reads");
         let views = Views::new(&trajectory, None, true).expect("no doubles");

@@ -6,7 +6,7 @@ use mixray::film::{Film, PixelSums};
 use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{BackendChoice, Scene};
 
-use super::support::scene;
+use crate::support::scene;
 
 const RAYS: u32 = 8;
 const ALL: (u32, u32) = (0, RAYS);

@@ -1,11 +1,14 @@
 //! Motion blur by copies along the motion in the picture.
 
 mod copies;
-pub(super) mod gpu;
+mod gpu;
+mod motion;
 pub(super) mod settings;
 mod stage;
+#[cfg(test)]
+mod tests;
 
 pub use copies::{Copies, CopyLayer, draw_copies};
+pub use motion::{ObjectBlur, PictureMotion};
 pub use settings::{MotionBlurMethod, MotionBlurSettings};
 pub(super) use stage::STAGE;
-pub use stage::{ObjectBlur, PictureMotion};

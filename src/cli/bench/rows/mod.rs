@@ -1,27 +1,30 @@
 //! `mixray bench SCENE...` and `mixray bench ablate SCENE...`: error against time, scene by scene.
 
+mod ablation;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::ablation::without_each;
-use super::command_line;
-use super::conclusions::conclude;
-use super::docs::Docs;
-use super::files::{Gallery, read_report, write_figures, write_pictures};
-use super::flags::{
-    OutputFlags, RaysFlag, RunFlags, finish, has_hardware_gpu, load_scenes, machine_of,
-};
-use super::regression::compare;
 use crate::bench::{
     FORMAT, Machine, Method, Plan, ReferenceGoal, Report, Source, markdown, measure, reference,
     text,
 };
+use crate::cli::bench::command_line;
+use crate::cli::bench::conclusions::conclude;
+use crate::cli::bench::docs::Docs;
+use crate::cli::bench::files::{Gallery, read_report, write_figures, write_pictures};
+use crate::cli::bench::flags::{
+    OutputFlags, RaysFlag, RunFlags, finish, has_hardware_gpu, load_scenes, machine_of,
+};
+use crate::cli::bench::regression::compare;
 use crate::cli::values::{above_zero, camera_noise, choice, rays_per_pixel};
 use crate::cli::{Failure, Outcome, interrupt, print, progress, say};
 use crate::renderer::{CameraNoise, SCRAMBLES, Skip};
 use crate::scene::{BackendChoice, Choice, Estimator};
+
+use ablation::without_each;
 
 /// Flags that say what is measured, which nothing is with `--report`.
 const OF_MEASURING: [&str; 16] = [
@@ -227,7 +230,14 @@ fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
         false => BackendChoice::Cpu,
     };
     let scenes = load_scenes(&arguments.scenes, arguments.runs.shrink, backend)?;
-    let folder = arguments.output.make_folder()?;
+    let plots = scenes.iter().flat_map(|scene| {
+        ["time.svg", "time.png", "rays.svg", "rays.png"]
+            .map(|axis| format!("{}-error-{axis}", scene.name))
+    });
+    let plots: Vec<String> = plots.collect();
+    let mut names = vec!["results.json", "results.csv", "index.html"];
+    names.extend(plots.iter().map(String::as_str));
+    let folder = arguments.output.make_folder(&names)?;
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
     let steps = progress::Steps::new(scenes.iter().map(|scene| job.runs_of(scene)).sum());
