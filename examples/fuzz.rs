@@ -11,6 +11,8 @@ use clap::Parser;
 
 /// Inputs of a reader between two looks at the clock and the memory.
 const BATCH: u64 = 500;
+/// Most memory that the process may ever have held.
+const MAX_BYTES: u64 = 2 << 30;
 
 #[derive(Parser)]
 struct Arguments {
@@ -46,7 +48,7 @@ fn main() -> Result<(), String> {
         for (index, fuzzer) in fuzzers.iter().enumerate() {
             let start = Instant::now();
             let batch = fuzzer.run(first..first + BATCH)?;
-            fuzz::check_memory()
+            check_memory()
                 .map_err(|problem| format!("{} {first}: {problem}", fuzzer.reader.name))?;
             counts[index].read += batch.read;
             counts[index].refused += batch.refused;
@@ -66,4 +68,20 @@ fn main() -> Result<(), String> {
         begin.elapsed().as_secs_f64()
     );
     Ok(())
+}
+
+/// That the process has not held more memory than it may.
+///
+/// # Errors
+/// It has.
+fn check_memory() -> Result<(), String> {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let peak = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix("kB"));
+    let peak = peak.and_then(|kilobytes| kilobytes.trim().parse::<u64>().ok());
+    match peak {
+        Some(peak) if peak * 1024 > MAX_BYTES => Err(format!("{peak} kB of memory were held")),
+        _ => Ok(()),
+    }
 }

@@ -3,7 +3,8 @@
 //
 // The tree is the compressed wide BVH of Ylitie, Karras and Laine (HPG 2017), made in src/accel/compressed.rs.
 
-import package::packed::bindings::{bvh_leaves, bvh_nodes, frame, NONE};
+import package::gpu::buffers::{bvh_leaves, bvh_nodes, frame};
+import package::shared::NONE;
 
 // A hit counts if t > t_min, or t == t_min and its id is larger than skip, and if t < t_max.
 struct Ray {

@@ -1,9 +1,9 @@
 // Twin of src/camera/shutter.rs: the same operations in the same order.
 
-import package::packed::bindings::{frame, FRAME_SHUTTER_ORDERED, SHUTTER_POSES};
+import package::gpu::buffers::frame;
+import package::packed::records::{FRAME_SHUTTER_ORDERED, SHUTTER_POSES};
 import package::camera::sampler::{SampleKey, sample_4d};
 
-const SHUTTER_SET: u32 = 1u;
 
 struct CameraPose {
     position: vec3<f32>,

@@ -1,8 +1,8 @@
 // Choosing a light and a point on it. Rust twin: src/light/lights.rs.
 
-import package::packed::bindings::{
-    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE, frame, lights,
-};
+import package::gpu::buffers::{frame, lights};
+import package::packed::records::{LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, SIDE_REAL};
+import package::shared::NONE;
 import package::light::environment::{env_evaluate, env_radiance, env_sample};
 import package::math::{cross3, dot3, length3, safe_sqrt};
 import package::cpu::state::FAR;
@@ -19,14 +19,14 @@ struct LightSample {
 }
 
 fn no_light() -> LightSample {
-    return LightSample(vec3<f32>(0.0, 0.0, 1.0), 0.0, vec3<f32>(0.0), 0.0, false, 0u);
+    return LightSample(vec3<f32>(0.0, 0.0, 1.0), 0.0, vec3<f32>(0.0), 0.0, false, SIDE_REAL);
 }
 
 fn light_select(u: f32, coin: f32) -> u32 {
     let scaled = u * f32(frame.light_count);
     let index = min(u32(scaled), frame.light_count - 1u);
     if coin < lights[index].alias_threshold { return index; }
-    return lights[index].alias_;
+    return lights[index].alias_light;
 }
 
 fn light_sample(index: u32, position: vec3<f32>, u: vec2<f32>) -> LightSample {

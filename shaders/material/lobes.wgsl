@@ -1,15 +1,11 @@
 // Twin of src/material/lobes.rs: the same operations in the same order.
 
-import package::packed::bindings::{MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT};
+import package::packed::records::{MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT};
 import package::material::fresnel::{fresnel_dielectric, normal_reflectance, relative_index, schlick, RelativeIndex};
 import package::material::ggx::MIN_COS;
 import package::math::dot3;
 import package::material::surface::Surface;
 
-const DELTA_ALPHA: f32 = 1e-3;
-const DELTA_BEND: f32 = 1e-4;
-const COAT_F0: f32 = 0.04;
-const NO_ALBEDO: f32 = 1e-30;
 
 struct Interface {
     reflected: vec3<f32>,

@@ -1,21 +1,17 @@
 // Twin of src/material/surface.rs: the same operations in the same order.
 
-import package::packed::bindings::{
-    frame, materials, photo_albedo, texture_refs, triangles, vertices, Material, Vertex, NONE, TEXTURE_UV1,
-    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO, MATERIAL_QUAD_LIGHT,
-    MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT
+import package::gpu::buffers::{frame, materials, photo_albedo, texture_refs, triangles, vertices};
+import package::packed::records::{
+    Material, Vertex, TEXTURE_UV1, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
+    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
 };
+import package::shared::NONE;
 @if(photo_albedo) import package::camera::lens::camera_project;
 import package::math::{cross3, dot3, safe_sqrt};
 import package::material::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
 import package::material::texture::{slot, slot_rgb, texture_sample};
 import package::accel::trace::Hit;
 
-const GAMMA_7: f32 = 4.172327e-7;
-const BARYCENTRIC_ERROR: f32 = 1.1920929e-7;
-const PLANE_ERROR: f32 = 2.3841858e-7;
-const SLIMMEST: f32 = 1e-4;
-const PHOTO_DEPTH_TOLERANCE: f32 = 0.02;
 
 struct Surface {
     position: vec3<f32>,

@@ -9,6 +9,10 @@ fn encode_(linear: f32) -> f32 {
     return 1.055 * exp_(log_(linear) * (1.0 / 2.4)) - 0.055;
 }
 
+fn encode_rgb(linear: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(encode_(linear.x), encode_(linear.y), encode_(linear.z));
+}
+
 fn decode_(encoded: f32) -> f32 {
     if encoded <= 0.04045 {
         return encoded * (1.0 / 12.92);

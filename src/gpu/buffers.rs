@@ -1,4 +1,4 @@
-//! The packed scene in storage buffers: bind group 0 of every kernel, as `shaders/packed/bindings.wgsl` declares it.
+//! The packed scene in storage buffers: bind group 0 of every kernel, under the names that `shaders/gpu/buffers.wgsl` declares.
 
 use bytemuck::Zeroable;
 
@@ -77,8 +77,9 @@ impl<'a> From<&'a PackedScene> for SceneParts<'a> {
 
 /// A scene on the device.
 pub struct SceneBuffers {
-    /// By binding number.
-    buffers: Vec<wgpu::Buffer>,
+    frame: wgpu::Buffer,
+    /// In the order of [`arrays`].
+    arrays: Vec<(&'static str, wgpu::Buffer)>,
 }
 
 impl SceneBuffers {
@@ -87,82 +88,137 @@ impl SceneBuffers {
     /// # Errors
     /// [`GpuError::Limit`] for an array that the adapter cannot bind or hold.
     pub fn from_parts(gpu: &GpuDevice, parts: &SceneParts<'_>) -> Result<Self, GpuError> {
-        let arrays = arrays(parts).map(|(what, _, bytes)| (what, bytes));
-        for (what, [first, second]) in &arrays {
-            check_size(gpu, what, (first.len() + second.len()) as u64)?;
+        let arrays = arrays(parts);
+        for array in &arrays {
+            check_size(gpu, array.what, array.len())?;
         }
-        let made = gpu.catching(|| {
-            let mut buffers = vec![gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        let made = gpu.catching(|| Self {
+            frame: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("frame"),
                 size: size_of::<Frame>() as u64,
                 usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
-            })];
-            for (what, [first, second]) in &arrays {
-                buffers.push(storage(gpu, what, first, second));
-            }
-            buffers
+            }),
+            arrays: arrays
+                .iter()
+                .map(|array| (array.name, storage(gpu, array)))
+                .collect(),
         });
-        let buffers = made.map_err(|error| out_of_memory(gpu, &arrays, &error))?;
-        let scene = Self { buffers };
-        scene.write_frame(gpu, &with_bases(parts));
+        let scene = made.map_err(|error| out_of_memory(gpu, &arrays, &error))?;
+        scene.set_frame(gpu, parts);
         Ok(scene)
     }
 
     /// Sends what has changed, where the buffers have room for it; false, and nothing is sent, where they have not.
     pub fn update(&self, gpu: &GpuDevice, parts: &SceneParts<'_>, changed: Changed) -> bool {
         let arrays = arrays(parts);
-        let fits = |(buffer, (_, _, [first, second])): (&wgpu::Buffer, &(_, _, [&[u8]; 2]))| {
-            (first.len() + second.len()) as u64 <= buffer.size()
-        };
-        if changed == Changed::All || !self.buffers[1..].iter().zip(&arrays).all(fits) {
+        let mut pairs = self.arrays.iter().zip(&arrays);
+        if changed == Changed::All
+            || !pairs.all(|((_, buffer), array)| array.len() <= buffer.size())
+        {
             return false;
         }
-        for (buffer, (_, of, [first, second])) in self.buffers[1..].iter().zip(&arrays) {
-            if *of == Changed::View || *of == changed {
-                gpu.queue.write_buffer(buffer, 0, first);
-                gpu.queue.write_buffer(buffer, first.len() as u64, second);
+        for ((_, buffer), array) in self.arrays.iter().zip(&arrays) {
+            if array.changed_by == Changed::View || array.changed_by == changed {
+                array.write(gpu, buffer);
             }
         }
-        self.write_frame(gpu, &with_bases(parts));
+        self.set_frame(gpu, parts);
         true
     }
 
-    /// Replaces the frame by that of `parts`, whose arrays are those that are here.
+    /// Replaces the frame (camera, lens and sampling) by that of `parts`, whose arrays are those that are here.
     pub fn set_frame(&self, gpu: &GpuDevice, parts: &SceneParts<'_>) {
-        self.write_frame(gpu, &with_bases(parts));
-    }
-
-    /// Replaces camera, lens and sampling; the arrays stay.
-    fn write_frame(&self, gpu: &GpuDevice, frame: &Frame) {
         gpu.queue
-            .write_buffer(&self.buffers[0], 0, bytemuck::bytes_of(frame));
+            .write_buffer(&self.frame, 0, bytemuck::bytes_of(&with_bases(parts)));
     }
 
-    /// The buffer of a binding of group 0.
-    pub fn get(&self, binding: u32) -> Option<&wgpu::Buffer> {
-        self.buffers.get(binding as usize)
+    /// The buffer of that name in `shaders/gpu/buffers.wgsl`.
+    pub fn get(&self, name: &str) -> Option<&wgpu::Buffer> {
+        let mut arrays = self.arrays.iter();
+        match name {
+            "frame" => Some(&self.frame),
+            _ => arrays.find(|(of, _)| *of == name).map(|(_, buffer)| buffer),
+        }
     }
 }
 
-/// Each array by binding, with the smallest edit that changes it.
-fn arrays<'a>(parts: &SceneParts<'a>) -> [(&'static str, Changed, [&'a [u8]; 2]); 12] {
-    let [real_nodes, virtual_nodes] = parts.bvh_nodes.map(bytemuck::cast_slice);
-    let [real_leaves, virtual_leaves] = parts.bvh_leaves.map(bytemuck::cast_slice);
+/// One array of a packed scene, in up to two pieces.
+struct Array<'a> {
+    /// In the shaders.
+    name: &'static str,
+    /// In messages.
+    what: &'static str,
+    /// The smallest edit that changes it.
+    changed_by: Changed,
+    pieces: [&'a [u8]; 2],
+}
+
+impl Array<'_> {
+    /// Bytes.
+    fn len(&self) -> u64 {
+        let [first, second] = self.pieces;
+        (first.len() + second.len()) as u64
+    }
+
+    fn write(&self, gpu: &GpuDevice, buffer: &wgpu::Buffer) {
+        let [first, second] = self.pieces;
+        gpu.queue.write_buffer(buffer, 0, first);
+        gpu.queue.write_buffer(buffer, first.len() as u64, second);
+    }
+}
+
+fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 12] {
     use Changed::{All, View, Virtual};
+    let array = |name, what, changed_by, pieces| Array {
+        name,
+        what,
+        changed_by,
+        pieces,
+    };
+    let SceneParts {
+        frame: _,
+        triangles,
+        vertices,
+        materials,
+        texture_refs,
+        texels,
+        lights,
+        env_texels,
+        env_cdf,
+        photo_albedo,
+        pixels,
+        bvh_nodes,
+        bvh_leaves,
+    } = *parts;
     [
-        ("triangles", Virtual, one(parts.triangles)),
-        ("vertices", Virtual, one(parts.vertices)),
-        ("materials", Virtual, one(parts.materials)),
-        ("textures", All, one(parts.texture_refs)),
-        ("texels", All, one(parts.texels)),
-        ("lights", Virtual, one(parts.lights)),
-        ("environment map", All, one(parts.env_texels)),
-        ("environment table", All, one(parts.env_cdf)),
-        ("albedo of the photograph", View, one(parts.photo_albedo)),
-        ("pixels", View, one(parts.pixels)),
-        ("BVH nodes", Virtual, [real_nodes, virtual_nodes]),
-        ("BVH triangles", Virtual, [real_leaves, virtual_leaves]),
+        array("triangles", "triangles", Virtual, one(triangles)),
+        array("vertices", "vertices", Virtual, one(vertices)),
+        array("materials", "materials", Virtual, one(materials)),
+        array("texture_refs", "textures", All, one(texture_refs)),
+        array("texels", "texels", All, one(texels)),
+        array("lights", "lights", Virtual, one(lights)),
+        array("env_texels", "environment map", All, one(env_texels)),
+        array("env_cdf", "environment table", All, one(env_cdf)),
+        array(
+            "photo_albedo",
+            "albedo of the photograph",
+            View,
+            one(photo_albedo),
+        ),
+        array("pixels", "pixels", View, one(pixels)),
+        array(
+            "bvh_nodes",
+            "BVH nodes",
+            Virtual,
+            bvh_nodes.map(bytemuck::cast_slice),
+        ),
+        array(
+            "bvh_leaves",
+            "BVH triangles",
+            Virtual,
+            bvh_leaves.map(bytemuck::cast_slice),
+        ),
     ]
 }
 
@@ -179,17 +235,16 @@ fn one<T: bytemuck::NoUninit>(records: &[T]) -> [&[u8]; 2] {
     [bytemuck::cast_slice(records), &[]]
 }
 
-fn storage(gpu: &GpuDevice, what: &str, first: &[u8], second: &[u8]) -> wgpu::Buffer {
+fn storage(gpu: &GpuDevice, array: &Array<'_>) -> wgpu::Buffer {
     // An empty array still needs room for one element of the largest record.
-    let size = (first.len() + second.len()).max(size_of::<Material>().max(256)) as u64;
+    let least = size_of::<Material>().max(256) as u64;
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(what),
-        size,
+        label: Some(array.what),
+        size: array.len().max(least),
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
-    gpu.queue.write_buffer(&buffer, 0, first);
-    gpu.queue.write_buffer(&buffer, first.len() as u64, second);
+    array.write(gpu, &buffer);
     buffer
 }
 
@@ -212,11 +267,11 @@ pub(super) fn check_size(gpu: &GpuDevice, what: &str, bytes: u64) -> Result<(), 
     })
 }
 
-fn out_of_memory(gpu: &GpuDevice, arrays: &[(&str, [&[u8]; 2])], error: &wgpu::Error) -> GpuError {
-    let total: usize = arrays.iter().map(|(_, [a, b])| a.len() + b.len()).sum();
+fn out_of_memory(gpu: &GpuDevice, arrays: &[Array<'_>], error: &wgpu::Error) -> GpuError {
+    let total: u64 = arrays.iter().map(Array::len).sum();
     GpuError::Limit {
         what: "the scene".to_owned(),
-        needed: mebibytes(total as u64),
+        needed: mebibytes(total),
         available: format!("memory ({error})"),
         adapter: gpu.name(),
         advice: "render with --backend cpu, or simplify the meshes and shrink the textures",
@@ -230,7 +285,40 @@ fn mebibytes(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::AdapterChoice;
+    use crate::gpu::kernel::reflect_bindings;
+    use crate::gpu::{AdapterChoice, Composer, Features};
+
+    /// A kernel that reads all of `names`.
+    fn bound(names: &[&str]) -> Result<Vec<String>, GpuError> {
+        let reads: String = names.iter().map(|name| format!("_ = &{name};")).collect();
+        let root = format!(
+            "import package::gpu::buffers::{{{}}};
+            @compute @workgroup_size(1) fn main() {{ {reads} }}",
+            names.join(", ")
+        );
+        let wgsl = Composer::default().with_module("root", root).compose(
+            "root",
+            "main",
+            &Features::all(),
+        )?;
+        let bindings = reflect_bindings(&wgsl).expect("valid");
+        Ok(bindings.into_iter().map(|binding| binding.name).collect())
+    }
+
+    #[test]
+    fn every_buffer_has_the_name_and_place_of_its_declaration() {
+        let parts = SceneParts::default();
+        let arrays = arrays(&parts).map(|array| array.name);
+        let names: Vec<&str> = std::iter::once("frame").chain(arrays).collect();
+        assert_eq!(bound(&names).expect("all are declared"), names);
+        let (_, text) = crate::gpu::compose::MODULES
+            .iter()
+            .find(|(module, _)| *module == "gpu::buffers")
+            .expect("is embedded");
+        assert_eq!(text.matches("@binding").count(), names.len());
+        // Negative control: a name that no shader declares.
+        assert!(bound(&["frame", "vertexes"]).is_err());
+    }
 
     #[test]
     fn a_scene_beyond_the_limits_is_refused_with_what_to_do() {

@@ -1,6 +1,6 @@
 //! Composes shaders: the embedded modules of `shaders/`, WESL imports and `@if(feature)`, unused declarations left out.
 //!
-//! Names of imported items carry their module: `package::light::cones::cone_pdf` is `light_cones_cone_pdf` in the emitted WGSL.
+//! Names of imported items carry their module: `package::light::cones::cone_pdf` is `light_cones__cone_pdf` in the emitted WGSL.
 
 use std::borrow::Cow;
 
@@ -8,6 +8,8 @@ use wesl::{CompileOptions, Feature, Mangler, ModulePath, VirtualResolver, Wesl};
 
 use super::GpuError;
 use crate::packed::{self, PackedScene};
+use crate::shared::{self, Module};
+use crate::{camera, film, light, material, math};
 
 /// The embedded modules, one a file of `shaders/`: name and source.
 pub const MODULES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/shader_modules.rs"));
@@ -110,23 +112,47 @@ impl Features {
             normal_maps: material(&|m| {
                 m.normal_texture != packed::NONE || m.clearcoat_normal_texture != packed::NONE
             }),
-            paper: scene.frame.estimator == 1,
+            paper: scene.frame.estimator == packed::ESTIMATOR_PAPER,
             rough_specular: material(&|m| m.flags & no_lobe == 0),
             shutter: scene.frame.flags & packed::FRAME_SHUTTER != 0,
         }
     }
 }
 
-/// `package::light::cones::cone_pdf` -> `light_cones_cone_pdf`.
+/// `package::light::cones::cone_pdf` -> `light_cones__cone_pdf`.
 struct ModuleItemMangler;
+
+/// Between module and item in an emitted name.
+const ITEM: &str = "__";
 
 impl Mangler for ModuleItemMangler {
     fn mangle(&self, path: &ModulePath, item: &str) -> String {
-        let mut words = path.components.clone();
-        words.push(item.to_owned());
-        words.join("_")
+        format!("{}{ITEM}{item}", path.components.join("_"))
     }
 }
+
+/// What the module that declares it calls the item of that emitted name.
+pub(super) fn item_name(emitted: &str) -> &str {
+    emitted.split_once(ITEM).map_or(emitted, |(_, item)| item)
+}
+
+/// What Rust declares for the shaders at the level of the estimator and below.
+pub(super) const DECLARED: &[&Module] = &[
+    &shared::SHARED,
+    &math::SHARED,
+    &packed::records::SHARED,
+    &camera::lens::SHARED,
+    &camera::sampler::SHARED,
+    &camera::shutter::SHARED,
+    &light::cones::SHARED,
+    &light::rectangle::SHARED,
+    &material::bsdf::SHARED,
+    &material::ggx::SHARED,
+    &material::lobes::SHARED,
+    &material::surface::SHARED,
+    &material::texture::SHARED,
+    &film::sums::SHARED,
+];
 
 /// A set of modules to compose from: the embedded ones, some of them replaced or joined by others.
 pub struct Composer {
@@ -134,13 +160,17 @@ pub struct Composer {
 }
 
 impl Default for Composer {
+    /// The files of `shaders/`, each with what its Rust twin declares for both.
     fn default() -> Self {
-        Self {
+        let files = Self {
             modules: MODULES
                 .iter()
                 .map(|&(name, source)| (name.to_owned(), Cow::Borrowed(source)))
                 .collect(),
-        }
+        };
+        DECLARED
+            .iter()
+            .fold(files, |composer, module| composer.with_shared(module))
     }
 }
 
@@ -149,6 +179,20 @@ impl Composer {
     pub fn with_module(mut self, name: &str, source: impl Into<Cow<'static, str>>) -> Self {
         self.modules.retain(|(present, _)| present != name);
         self.modules.push((name.to_owned(), source.into()));
+        self
+    }
+
+    /// Adds what a Rust file declares with [`shared!`](crate::shared) to the module of the same path.
+    pub(crate) fn with_shared(mut self, declared: &Module) -> Self {
+        let path = declared.path();
+        match self.modules.iter_mut().find(|(name, _)| name == path) {
+            Some((_, source)) => {
+                let text = source.to_mut();
+                text.push('\n');
+                text.push_str(&declared.wgsl());
+            }
+            None => self.modules.push((path.to_owned(), declared.wgsl().into())),
+        }
         self
     }
 
@@ -217,7 +261,8 @@ mod tests {
     use super::*;
 
     const ROOT: &str = "
-import package::packed::bindings::{frame, lights, NONE};
+import package::gpu::buffers::{frame, lights};
+import package::shared::NONE;
 import package::extra::helper;
 @if(lens) fn radius() -> f32 { return frame.aperture_radius; }
 @else fn radius() -> f32 { return 0.0; }
@@ -252,17 +297,13 @@ fn unused() -> u32 { return lights[0].kind; }
             ..Features::default()
         };
         let first = compose("first", &lens);
-        assert_eq!(binding_names(&first), ["packed_bindings_frame"], "{first}");
+        assert_eq!(binding_names(&first), ["frame"], "{first}");
         assert!(
-            first.contains("extra_helper") && !first.contains("second"),
+            first.contains("extra__helper") && !first.contains("second"),
             "{first}"
         );
         let second = compose("second", &lens);
-        assert_eq!(
-            binding_names(&second),
-            ["packed_bindings_lights"],
-            "{second}"
-        );
+        assert_eq!(binding_names(&second), ["lights"], "{second}");
     }
 
     #[test]

@@ -99,11 +99,10 @@ impl Probe<'_> {
         let output_words = records * self.output_words;
         let output = buffer(output_words, Usage::STORAGE | Usage::COPY_SRC);
         let staging = buffer(output_words, Usage::MAP_READ | Usage::COPY_DST);
-        let groups = kernel.bind(gpu, |group, binding| match (group, binding) {
-            (0, _) => self.scene?.get(binding),
-            (1, 0) => Some(&input),
-            (1, 1) => Some(&output),
-            _ => None,
+        let groups = kernel.bind(gpu, |name| match name {
+            "probe_inputs" => Some(&input),
+            "probe_outputs" => Some(&output),
+            _ => self.scene?.get(name),
         })?;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -203,7 +202,7 @@ mod tests {
         let scene = SceneBuffers::from_parts(gpu, &parts).expect("uploads");
         let mut probe = Probe {
             features: Features::default(),
-            prelude: "import package::packed::bindings::{frame, triangles};",
+            prelude: "import package::gpu::buffers::{frame, triangles};",
             body: "output(0u, triangles[input(0u)].material); output(1u, frame.width);",
             input_words: 1,
             output_words: 2,

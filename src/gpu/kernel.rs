@@ -1,7 +1,10 @@
 //! A compute pipeline made from composed WGSL; its bind group layouts are read off the code itself.
 
+use std::collections::HashSet;
+
 use wgpu::naga;
 
+use super::compose::item_name;
 use super::{GpuDevice, GpuError};
 
 /// One buffer that a kernel binds.
@@ -9,6 +12,7 @@ use super::{GpuDevice, GpuError};
 pub struct Binding {
     pub group: u32,
     pub binding: u32,
+    /// As its shader file declares it.
     pub name: String,
     pub uniform: bool,
     pub read_only: bool,
@@ -45,7 +49,7 @@ pub fn reflect_bindings(wgsl: &str) -> Result<Vec<Binding>, String> {
             Some(Binding {
                 group: at.group,
                 binding: at.binding,
-                name: variable.name.clone().unwrap_or_default(),
+                name: item_name(variable.name.as_deref().unwrap_or_default()).to_owned(),
                 uniform,
                 read_only,
                 stride,
@@ -78,6 +82,13 @@ impl Kernel {
             message,
         };
         let bindings = reflect_bindings(wgsl).map_err(shader_error)?;
+        let mut names = HashSet::new();
+        if let Some(twice) = bindings.iter().find(|b| !names.insert(b.name.as_str())) {
+            return Err(shader_error(format!(
+                "two buffers are called {}",
+                twice.name
+            )));
+        }
         let storage = bindings.iter().filter(|binding| !binding.uniform).count();
         let allowed = gpu.limits.max_storage_buffers_per_shader_stage;
         if storage > allowed as usize {
@@ -136,21 +147,21 @@ impl Kernel {
         &self.bindings
     }
 
-    /// Bind groups with the buffers that `resource` gives for (group, binding).
+    /// Bind groups with the buffers that `resource` gives for the names of their declarations.
     ///
     /// # Errors
     /// [`GpuError::Unbound`] if it gives none for a buffer that the kernel reads.
     pub fn bind<'a>(
         &self,
         gpu: &GpuDevice,
-        resource: impl Fn(u32, u32) -> Option<&'a wgpu::Buffer>,
+        resource: impl Fn(&str) -> Option<&'a wgpu::Buffer>,
     ) -> Result<BindGroups, GpuError> {
         let mut groups = Vec::new();
         for (group, layout) in (0..).zip(&self.layouts) {
             let Some(layout) = layout else { continue };
             let mut entries = Vec::new();
             for binding in self.bindings.iter().filter(|b| b.group == group) {
-                let buffer = resource(group, binding.binding).ok_or_else(|| GpuError::Unbound {
+                let buffer = resource(&binding.name).ok_or_else(|| GpuError::Unbound {
                     entry_point: self.entry_point.clone(),
                     name: binding.name.clone(),
                 })?;

@@ -1,256 +1,155 @@
-//! Host records against their WGSL structs, by naga reflection; needs no device.
+//! What Rust declares for the shaders against what the shaders make of it, by naga's reflection of composed code; needs no device.
 
 use std::collections::HashMap;
 
-use bytemuck::Zeroable;
 use wgpu::naga;
 
-use crate::packed::*;
+use super::compose::{Composer, DECLARED, Features, item_name};
+use crate::shared::{Module, Value};
 
-/// Name, offset, size.
-type Fields = Vec<(String, u32, u32)>;
-
-/// The pattern without `..` names every field, or does not compile.
-macro_rules! host_fields {
-    ($record:ident { $($field:ident),* $(,)? }) => {{
-        let zero: $record = Zeroable::zeroed();
-        let $record { $($field),* } = zero;
-        let fields: Fields = vec![$((
-            stringify!($field).to_owned(),
-            std::mem::offset_of!($record, $field) as u32,
-            size_of_val(&$field) as u32,
-        )),*];
-        (stringify!($record), size_of::<$record>() as u32, fields)
-    }};
+/// A composed and parsed kernel that uses every constant and record of a declaration.
+struct Reflected {
+    module: naga::Module,
+    layouter: naga::proc::Layouter,
 }
 
-fn host() -> Vec<(&'static str, u32, Fields)> {
-    vec![
-        host_fields!(Frame {
-            camera_position,
-            camera_right,
-            camera_up,
-            camera_back,
-            intrinsics,
-            distortion,
-            distortion_k3,
-            aperture_radius,
-            inv_focus_distance,
-            blade_rotation,
-            aperture_shape,
-            width,
-            height,
-            seed,
-            sampler,
-            rays_total,
-            max_bounces,
-            estimator,
-            real_triangle_count,
-            light_count,
-            sphere_count,
-            flags,
-            env_cos,
-            env_sin,
-            env_width,
-            env_height,
-            env_radiance,
-            env_light,
-            exposure_scale,
-            virtual_node_base,
-            virtual_leaf_base,
-            clamp_indirect,
-            shutter_row,
-            shutter_open,
-            pad,
-            spheres,
-            shutter_poses,
-        }),
-        host_fields!(Vertex {
-            position_u0,
-            normal_v0,
-            tangent,
-            color,
-            uv1
-        }),
-        host_fields!(Triangle {
-            vertices,
-            material,
-            light,
-            object,
-            pad
-        }),
-        host_fields!(Material {
-            base_color,
-            emissive,
-            normal_scale,
-            metallic,
-            roughness,
-            ior,
-            specular,
-            specular_color,
-            transmission,
-            sigma_a,
-            clearcoat,
-            clearcoat_roughness,
-            clearcoat_normal_scale,
-            alpha_cutoff,
-            self_shadow_bias,
-            flags,
-            base_color_texture,
-            metallic_roughness_texture,
-            normal_texture,
-            emissive_texture,
-            specular_texture,
-            specular_color_texture,
-            transmission_texture,
-            clearcoat_texture,
-            clearcoat_roughness_texture,
-            clearcoat_normal_texture,
-            pad,
-        }),
-        host_fields!(TextureRef {
-            offset,
-            width,
-            height,
-            flags,
-            transform_u,
-            transform_v
-        }),
-        host_fields!(Light {
-            position,
-            axis_u,
-            axis_v,
-            radiance,
-            kind,
-            side,
-            select_pdf,
-            alias_threshold,
-            alias,
-            triangle,
-            pad,
-        }),
-        host_fields!(PixelInfo {
-            difference_period,
-            sample_factor,
-            flags
-        }),
-    ]
-}
+impl Reflected {
+    fn of(composer: Composer, declared: &Module) -> Self {
+        let constants = declared.constants.iter().map(|constant| constant.name);
+        let records = declared.records.iter().map(|record| record.name);
+        let names: Vec<&str> = constants.clone().chain(records.clone()).collect();
+        let uses: String = constants
+            .map(|name| format!("_ = {name};\n"))
+            .chain(records.map(|name| format!("var a_{name}: {name}; _ = &a_{name};\n")))
+            .collect();
+        let root = format!(
+            "import package::{}::{{{}}};\n@compute @workgroup_size(1) fn main() {{\n{uses}}}",
+            declared.path(),
+            names.join(", "),
+        );
+        let wgsl = composer
+            .with_module("root", root)
+            .compose("root", "main", &Features::all())
+            .unwrap_or_else(|error| panic!("{}: {error}", declared.path()));
+        let module = naga::front::wgsl::parse_str(&wgsl)
+            .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&wgsl)));
+        let mut layouter = naga::proc::Layouter::default();
+        layouter.update(module.to_ctx()).expect("layout");
+        Self { module, layouter }
+    }
 
-fn bindings_module() -> (naga::Module, naga::proc::Layouter) {
-    let source = include_str!("../../shaders/packed/bindings.wgsl");
-    let module = naga::front::wgsl::parse_str(source).expect("bindings.wgsl is plain WGSL");
-    let mut layouter = naga::proc::Layouter::default();
-    layouter.update(module.to_ctx()).expect("layout");
-    (module, layouter)
-}
+    fn constants(&self) -> HashMap<&str, Value> {
+        let literal = |expression: &naga::Expression| match expression {
+            naga::Expression::Literal(naga::Literal::U32(x)) => Some(Value::U32(*x)),
+            naga::Expression::Literal(naga::Literal::I32(x)) => Some(Value::I32(*x)),
+            naga::Expression::Literal(naga::Literal::F32(x)) => Some(Value::F32(*x)),
+            _ => None,
+        };
+        let expressions = &self.module.global_expressions;
+        let value = |expression: &naga::Expression| match expression {
+            naga::Expression::Compose { ty, components } => {
+                let (mut words, mut numbers) = (Vec::new(), Vec::new());
+                for part in components {
+                    match literal(&expressions[*part])? {
+                        Value::U32(x) => words.push(x),
+                        Value::F32(x) => numbers.push(x),
+                        _ => return None,
+                    }
+                }
+                match self.module.types[*ty].inner {
+                    naga::TypeInner::Vector { .. } => numbers.try_into().ok().map(Value::Vec3),
+                    _ if numbers.is_empty() => Some(Value::U32s(words)),
+                    _ => Some(Value::F32s(numbers)),
+                }
+            }
+            other => literal(other),
+        };
+        self.module
+            .constants
+            .iter()
+            .filter_map(|(_, constant)| {
+                let name = item_name(constant.name.as_deref()?);
+                Some((name, value(&expressions[constant.init])?))
+            })
+            .collect()
+    }
 
-/// Size of an array element, and the fields.
-fn shader() -> HashMap<String, (u32, Fields)> {
-    let (module, layouter) = bindings_module();
-    module
-        .types
-        .iter()
-        .filter_map(|(handle, ty)| {
-            let naga::TypeInner::Struct { members, .. } = &ty.inner else {
-                return None;
-            };
-            let fields = members
-                .iter()
-                .map(|member| {
-                    // `alias` is a keyword in WGSL, where the field is called `alias_`.
-                    let name = member.name.clone().unwrap_or_default();
-                    (
-                        name.trim_end_matches('_').to_owned(),
-                        member.offset,
-                        layouter[member.ty].size,
-                    )
-                })
-                .collect();
-            Some((ty.name.clone()?, (layouter[handle].to_stride(), fields)))
-        })
-        .collect()
-}
-
-#[test]
-fn every_record_has_the_same_layout_on_both_sides() {
-    let shader = shader();
-    for (record, size, fields) in host() {
-        let (shader_size, shader_fields) = &shader[record];
-        assert_eq!((size, &fields), (*shader_size, shader_fields), "{record}");
+    /// By name: bytes of an array's element, and name, offset and size of the fields.
+    fn records(&self) -> HashMap<&str, (usize, Vec<(&str, usize, usize)>)> {
+        self.module
+            .types
+            .iter()
+            .filter_map(|(handle, kind)| {
+                let naga::TypeInner::Struct { members, .. } = &kind.inner else {
+                    return None;
+                };
+                let fields = members
+                    .iter()
+                    .map(|member| {
+                        let size = self.layouter[member.ty].size;
+                        let name = member.name.as_deref().unwrap_or_default();
+                        (name, member.offset as usize, size as usize)
+                    })
+                    .collect();
+                let stride = self.layouter[handle].to_stride() as usize;
+                Some((item_name(kind.name.as_deref()?), (stride, fields)))
+            })
+            .collect()
     }
 }
 
-#[test]
-fn a_swapped_pair_of_fields_is_noticed() {
-    let shader = shader();
-    let (record, _, mut fields) = host().swap_remove(3);
-    assert_eq!(record, "Material");
-    let (roughness, ior) = (5, 6);
-    let name = std::mem::take(&mut fields[roughness].0);
-    fields[roughness].0 = std::mem::replace(&mut fields[ior].0, name);
-    assert_ne!(fields, shader[record].1);
-}
-
-#[test]
-fn constants_have_the_same_values_on_both_sides() {
-    macro_rules! host_constants {
-        ($($name:ident),* $(,)?) => { vec![$((stringify!($name), $name as u64)),*] };
-    }
-    let expected = host_constants![
-        NONE,
-        MAX_SPHERES,
-        FRAME_ENV_DRAWN,
-        FRAME_AOVS,
-        FRAME_ALPHA,
-        FRAME_LIGHTS_SUFFICE,
-        FRAME_SHUTTER,
-        FRAME_SHUTTER_ORDERED,
-        FRAME_BOTH_SHADOWS,
-        FRAME_NO_CONES,
-        FRAME_NO_LAST_VERTEX,
-        SHUTTER_POSES,
-        MATERIAL_LAMBERTIAN,
-        MATERIAL_ALPHA_MASK,
-        MATERIAL_ALPHA_BLEND,
-        MATERIAL_UNLIT,
-        MATERIAL_THIN_WALLED,
-        MATERIAL_PHOTO_ALBEDO,
-        MATERIAL_QUAD_LIGHT,
-        MATERIAL_TEXTURED,
-        TEXTURE_SRGB,
-        TEXTURE_NEAREST,
-        TEXTURE_UV1,
-        TEXTURE_WRAP_U_SHIFT,
-        TEXTURE_WRAP_V_SHIFT,
-        LIGHT_POINT,
-        LIGHT_SPOT,
-        LIGHT_DIRECTIONAL,
-        LIGHT_QUAD,
-        LIGHT_TRIANGLE,
-        LIGHT_ENVIRONMENT,
-        PIXEL_BEAM_MAY_MEET_VIRTUAL,
-        PIXEL_OUT_OF_REACH,
-    ];
-    let (module, _) = bindings_module();
-    let found: HashMap<String, u64> = module
+/// Of every constant and record of `declared` that is otherwise in the shaders: its name.
+pub(crate) fn differences(composer: Composer, declared: &Module) -> Vec<&'static str> {
+    let reflected = Reflected::of(composer, declared);
+    let constants = reflected.constants();
+    let records = reflected.records();
+    let other_constants = declared
         .constants
         .iter()
-        .filter_map(
-            |(_, constant)| match module.global_expressions[constant.init] {
-                naga::Expression::Literal(naga::Literal::U32(value)) => {
-                    Some((constant.name.clone()?, u64::from(value)))
-                }
-                _ => None,
-            },
-        )
-        .collect();
-    for (name, value) in &expected {
-        assert_eq!(found.get(*name), Some(value), "{name}");
+        .filter(|constant| constants.get(constant.name) != Some(&(constant.value)()))
+        .map(|constant| constant.name);
+    let other_records = declared
+        .records
+        .iter()
+        .filter(|record| {
+            let fields = record.fields.iter();
+            let fields = fields.map(|field| (field.name, field.offset, field.size));
+            records.get(record.name) != Some(&(record.size, fields.collect()))
+        })
+        .map(|record| record.name);
+    other_constants.chain(other_records).collect()
+}
+
+#[test]
+fn what_is_declared_is_the_same_on_both_sides() {
+    for declared in DECLARED {
+        assert!(!declared.constants.is_empty() || !declared.records.is_empty());
+        let found = differences(Composer::default(), declared);
+        assert!(found.is_empty(), "{}: {found:?}", declared.path());
     }
-    assert_eq!(
-        found.len(),
-        expected.len(),
-        "a constant of the shader is not compared"
-    );
+}
+
+#[test]
+fn another_value_and_a_swapped_pair_of_fields_are_noticed() {
+    let records = &crate::packed::records::SHARED;
+    let text = records.wgsl();
+    let changed = [
+        (
+            "MAX_SPHERES: u32 = 16u",
+            "MAX_SPHERES: u32 = 17u",
+            "MAX_SPHERES",
+        ),
+        (
+            "    roughness: f32,\n    ior: f32,\n",
+            "    ior: f32,\n    roughness: f32,\n",
+            "Material",
+        ),
+        ("    pad: vec2<u32>,\n", "", "Triangle"),
+    ];
+    for (from, to, name) in changed {
+        let other = text.replacen(from, to, 1);
+        assert_ne!(other, text, "{from} is not declared");
+        let composer = Composer::default().with_module(records.path(), other);
+        assert_eq!(differences(composer, records), [name]);
+    }
 }

@@ -61,15 +61,16 @@ fn kernels_bind_what_they_use_and_no_more() {
     let composer = Composer::default();
     let set = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
     let turn = bound(&composer, "kernel_turn", &Features::all());
-    assert_eq!(turn, set(&["gpu_lanes_counters", "gpu_lanes_indirect"]));
+    assert_eq!(turn, set(&["counters", "indirect"]));
     let accumulate: BTreeSet<String> = set(&[
-        "packed_bindings_frame",
-        "gpu_lanes_batch",
-        "gpu_lanes_counters",
-        "gpu_lanes_guide_sums",
-        "gpu_lanes_paths",
-        "gpu_lanes_pixel_sums",
-        "gpu_lanes_work",
+        "frame",
+        "batch",
+        "guide_sums",
+        "path_first_hits",
+        "path_radiances_real",
+        "path_results",
+        "pixel_sums",
+        "work",
     ]);
     assert_eq!(
         bound(&composer, "kernel_accumulate", &Features::all()),
@@ -102,47 +103,47 @@ const TRACES: &[Trace] = &[
     Trace {
         feature: "textures",
         with: &[
-            "packed_bindings_texels",
-            "fn material_texture_slot",
-            "fn material_texture_texture_sample",
+            "gpu_buffers__texels",
+            "fn material_texture__slot",
+            "fn material_texture__texture_sample",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "alpha",
-        with: &["fn material_surface_coverage_of"],
+        with: &["fn material_surface__coverage_of"],
         ..ADVANCE
     },
     Trace {
         feature: "alpha",
         kernel: "kernel_trace",
         with: &[
-            "packed_bindings_materials",
-            "packed_bindings_vertices",
-            "fn cpu_request_meets",
-            "fn material_surface_surface_alpha",
+            "gpu_buffers__materials",
+            "gpu_buffers__vertices",
+            "fn cpu_request__meets",
+            "fn material_surface__surface_alpha",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "transmission",
-        with: &[".sigma_a", "fn math_exp_"],
+        with: &[".sigma_a", "fn math__exp_"],
         ..ADVANCE
     },
     Trace {
         feature: "transmission",
         with: &[
-            "fn material_bsdf_eval_transmission",
-            "fn material_bsdf_transmit_straight",
-            "fn material_ggx_ggx_refract",
-            "fn material_fresnel_refract_about",
+            "fn material_bsdf__eval_transmission",
+            "fn material_bsdf__transmit_straight",
+            "fn material_ggx__ggx_refract",
+            "fn material_fresnel__refract_about",
         ],
         beside: &["rough_specular"],
         ..ADVANCE
     },
     Trace {
         feature: "clearcoat",
-        with: &["fn material_bsdf_sample_coat"],
+        with: &["fn material_bsdf__sample_coat"],
         beside: &["rough_specular"],
         ..ADVANCE
     },
@@ -155,28 +156,28 @@ const TRACES: &[Trace] = &[
     Trace {
         feature: "environment_map",
         with: &[
-            "packed_bindings_env_cdf",
-            "packed_bindings_env_texels",
-            "fn light_environment_env_sample_map",
-            "fn light_environment_find_interval",
+            "gpu_buffers__env_cdf",
+            "gpu_buffers__env_texels",
+            "fn light_environment__env_sample_map",
+            "fn light_environment__find_interval",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "area_lights",
         with: &[
-            "fn light_lights_sample_area_light",
-            "fn light_lights_light_pdf_hit",
-            "fn light_rectangle_",
-            "fn material_surface_triangle_emission",
+            "fn light_lights__sample_area_light",
+            "fn light_lights__light_pdf_hit",
+            "fn light_rectangle__",
+            "fn material_surface__triangle_emission",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "delta_lights",
         with: &[
-            "fn light_lights_sample_point_light",
-            "fn light_lights_spot_falloff",
+            "fn light_lights__sample_point_light",
+            "fn light_lights__spot_falloff",
         ],
         ..ADVANCE
     },
@@ -184,46 +185,49 @@ const TRACES: &[Trace] = &[
         feature: "lens",
         kernel: "kernel_generate",
         with: &[
-            "fn camera_lens_sample_lens",
-            "packed_bindings_frame.aperture_radius",
-            "packed_bindings_frame.inv_focus_distance",
+            "fn camera_lens__sample_lens",
+            "gpu_buffers__frame.aperture_radius",
+            "gpu_buffers__frame.inv_focus_distance",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "multi_bounce",
-        with: &["cpu_vertex_ROULETTE_GAIN", "cpu_vertex_ROULETTE_FROM_DEPTH"],
+        with: &[
+            "cpu_vertex__ROULETTE_GAIN",
+            "cpu_vertex__ROULETTE_FROM_DEPTH",
+        ],
         ..ADVANCE
     },
     Trace {
         feature: "photo_albedo",
         with: &[
-            "packed_bindings_photo_albedo",
-            "fn material_surface_photo_albedo_at",
+            "gpu_buffers__photo_albedo",
+            "fn material_surface__photo_albedo_at",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "normal_maps",
         with: &[
-            "fn material_surface_perturbed",
-            "fn material_normal_mapped_normal",
-            "fn material_normal_tangent_from_uv",
+            "fn material_surface__perturbed",
+            "fn material_normal__mapped_normal",
+            "fn material_normal__tangent_from_uv",
         ],
         beside: &["textures"],
         ..ADVANCE
     },
     Trace {
         feature: "paper",
-        with: &["fn cpu_estimator_paper_behind", ".radiance_real"],
+        with: &["fn cpu_estimator__paper_behind", ".radiance_real"],
         without: &[
-            "fn cpu_estimator_primary_virtual",
-            "fn cpu_estimator_difference_shadow",
-            "fn cpu_estimator_difference_cone",
-            "fn cpu_estimator_difference_bsdf",
-            "fn cpu_estimator_split_difference",
-            "fn cpu_vertex_plan_cone",
-            "fn light_cones_",
+            "fn cpu_estimator__primary_virtual",
+            "fn cpu_estimator__difference_shadow",
+            "fn cpu_estimator__difference_cone",
+            "fn cpu_estimator__difference_bsdf",
+            "fn cpu_estimator__split_difference",
+            "fn cpu_vertex__plan_cone",
+            "fn light_cones__",
         ],
         ..ADVANCE
     },
@@ -237,19 +241,19 @@ const TRACES: &[Trace] = &[
         feature: "shutter",
         kernel: "kernel_generate",
         with: &[
-            "fn camera_shutter_shutter_share",
-            "fn camera_shutter_camera_pose_at",
-            "packed_bindings_frame.shutter_poses",
+            "fn camera_shutter__shutter_share",
+            "fn camera_shutter__camera_pose_at",
+            "gpu_buffers__frame.shutter_poses",
         ],
         ..ADVANCE
     },
     Trace {
         feature: "rough_specular",
         with: &[
-            "fn material_ggx_",
-            "fn material_bsdf_sample_layers",
-            "fn material_bsdf_eval_reflection",
-            "fn material_normal_valid_shading_normal",
+            "fn material_ggx__",
+            "fn material_bsdf__sample_layers",
+            "fn material_bsdf__eval_reflection",
+            "fn material_normal__valid_shading_normal",
         ],
         ..ADVANCE
     },
@@ -304,10 +308,10 @@ fn one_bounce_has_no_recursion() {
         };
         let wgsl = valid(&Composer::default(), "kernel_advance", &features);
         let (_, rest) = wgsl
-            .split_once("fn cpu_estimator_difference_bsdf")
+            .split_once("fn cpu_estimator__difference_bsdf")
             .expect("is there");
         let (body, _) = rest.split_once("\nfn ").unwrap_or((rest, ""));
-        body.matches("cpu_estimator_plan_vertex(").count()
+        body.matches("cpu_estimator__plan_vertex(").count()
     };
     assert_eq!((plans(true), plans(false)), (1, 0));
 }
@@ -318,7 +322,7 @@ fn an_invalid_variant_is_noticed() {
     let broken = Composer::default().with_module(
         "cpu::request",
         "import package::cpu::state::PathState;
-        fn answer(path: ptr<function, PathState>, thread: u32) { @if(clearcoat) { _ = not_there(thread); } }",
+        fn answer(st: ptr<function, PathState>, thread: u32) { @if(clearcoat) { _ = not_there(thread); } }",
     );
     valid(&broken, "kernel_trace", &Features::all());
 }

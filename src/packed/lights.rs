@@ -5,7 +5,7 @@ use glam::{DVec3, Vec2, Vec3};
 use super::{
     FRAME_LIGHTS_SUFFICE, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD,
     LIGHT_SPOT, LIGHT_TRIANGLE, Light, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT, Material, NONE,
-    PackedScene, TEXTURE_UV1,
+    PackedScene, SIDE_REAL, SIDE_VIRTUAL, TEXTURE_UV1,
 };
 use crate::light::rectangle::is_rectangle;
 use crate::material::texture_sample;
@@ -40,7 +40,10 @@ pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
     let radius = scene_radius(packed);
     let anchor = DVec3::from(packed.anchor_m);
     for light in &scene.lights {
-        let side = u32::from(light.side == Side::Virtual);
+        let side = match light.side {
+            Side::Real => SIDE_REAL,
+            Side::Virtual => SIDE_VIRTUAL,
+        };
         let (record, power) = pack_light(&light.kind, side, anchor, radius);
         lights.push(record);
         powers.push(power);
@@ -49,7 +52,7 @@ pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
     packed.frame.env_light = NONE;
     if packed.env_mean_luminance > 0.0 {
         packed.frame.env_light = lights.len() as u32;
-        lights.push(blank(LIGHT_ENVIRONMENT, 0));
+        lights.push(blank(LIGHT_ENVIRONMENT, SIDE_REAL));
         powers.push(packed.env_mean_luminance * std::f64::consts::PI.powi(2) * radius * radius);
     }
     set_probabilities(&mut lights, &powers);
@@ -98,7 +101,7 @@ fn blank(kind: u32, side: u32) -> Light {
         side,
         select_pdf: 0.0,
         alias_threshold: 1.0,
-        alias: NONE,
+        alias_light: NONE,
         triangle: NONE,
         pad: [0; 2],
     }
@@ -279,7 +282,7 @@ fn set_probabilities(lights: &mut [Light], powers: &[f64]) {
     while let (Some(&s), Some(&l)) = (small.last(), large.last()) {
         small.pop();
         lights[s].alias_threshold = scaled[s] as f32;
-        lights[s].alias = l as u32;
+        lights[s].alias_light = l as u32;
         scaled[l] -= 1.0 - scaled[s];
         if scaled[l] < 1.0 {
             large.pop();
@@ -288,6 +291,6 @@ fn set_probabilities(lights: &mut [Light], powers: &[f64]) {
     }
     for rest in small.into_iter().chain(large) {
         lights[rest].alias_threshold = 1.0;
-        lights[rest].alias = rest as u32;
+        lights[rest].alias_light = rest as u32;
     }
 }

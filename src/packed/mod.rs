@@ -1,12 +1,12 @@
 //! The scene as both backends read it: flat arrays of plain records, f32, positions relative to an anchor near the camera.
 //!
-//! Every record here has a WGSL struct of the same name and field order in `shaders/packed/bindings.wgsl`; a test compares the two by reflection.
+//! The records are declared for both sides at once ([`records`], [`crate::shared`]).
 //! Triangle ids are global: real triangles come first (`0..Frame::real_triangle_count`), virtual ones after.
 
 mod build;
 mod lights;
 mod materials;
-mod records;
+pub(crate) mod records;
 mod shutter;
 #[cfg(test)]
 mod test_support;
@@ -21,15 +21,7 @@ pub use shutter::{Instant, instants, row_ends, traced_shutter};
 pub use test_support::{test_mesh, test_scene};
 
 use crate::accel::WorldBvh;
-
-/// Index that stands for "none" in every u32 reference.
-pub const NONE: u32 = u32::MAX;
-
-/// Bounding spheres of the virtual geometry, at most this many.
-pub const MAX_SPHERES: usize = 16;
-
-/// Camera poses at equal steps of the time for which the shutter is open, the first and the last moment included.
-pub const SHUTTER_POSES: usize = 9;
+pub use crate::shared::NONE;
 
 /// What a backend renders.
 pub struct PackedScene {

@@ -11,6 +11,11 @@ pub fn encode_(linear: f32) -> f32 {
     }
 }
 
+/// [`encode_`] of each channel.
+pub fn encode_rgb(linear: [f32; 3]) -> [f32; 3] {
+    linear.map(encode_)
+}
+
 /// Linear value of an encoded one.
 pub fn decode_(encoded: f32) -> f32 {
     if encoded <= 0.040_45 {

@@ -1,46 +1,40 @@
-//! The camera stages on wgpu: twins of [`crate::stages`], equal to them within one 8-bit code.
+//! What the stages' twins share on wgpu. Each stage adds its own to [`GpuStages`], in its `gpu.rs`; it equals the CPU's within one 8-bit code.
 //!
 //! A stage uploads its pictures, runs its kernels once and reads the result back; kernels are compiled at their first use.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::STAGES;
 use crate::gpu::kernel::Kernel;
 use crate::gpu::{Composer, Features, GpuDevice, GpuError};
 
 /// Threads of a workgroup along each axis.
 const TILE: u32 = 8;
 
-/// Every kernel of the stages: module and entry point.
-pub const STAGE_KERNELS: &[(&str, &str)] = &[
-    ("stages::antialias", "stage_antialias"),
-    ("stages::cartoon", "stage_shrink"),
-    ("stages::cartoon", "stage_filter"),
-    ("stages::cartoon", "stage_respond"),
-    ("stages::cartoon", "stage_compose"),
-    ("stages::copies", "stage_copies"),
-    ("stages::cartoon::flow", "stage_tensor"),
-    ("stages::cartoon::flow", "stage_blur_rows"),
-    ("stages::cartoon::flow", "stage_blur_columns"),
-    ("stages::cartoon::flow", "stage_across"),
-    ("stages::cartoon::flow", "stage_along"),
-    ("stages::noise", "stage_white"),
-    ("stages::noise", "stage_missing"),
-    ("stages::noise", "stage_textures"),
-];
+/// A kernel by the module of `shaders/` that it stands in and its entry point.
+pub(super) type KernelName = (&'static str, &'static str);
 
 /// The stages on one device.
 pub struct GpuStages {
     gpu: Arc<GpuDevice>,
     composer: Composer,
-    kernels: Mutex<HashMap<&'static str, Arc<Kernel>>>,
+    kernels: Mutex<HashMap<KernelName, Arc<Kernel>>>,
+}
+
+/// The shaders with what the stages declare.
+pub(super) fn composer() -> Composer {
+    let declared = STAGES.iter().flat_map(|stage| stage.declared);
+    declared.fold(Composer::default(), |composer, module| {
+        composer.with_shared(module)
+    })
 }
 
 impl GpuStages {
     pub fn new(gpu: Arc<GpuDevice>) -> Self {
         Self {
             gpu,
-            composer: Composer::default(),
+            composer: composer(),
             kernels: Mutex::default(),
         }
     }
@@ -50,20 +44,17 @@ impl GpuStages {
     }
 
     /// The kernel of that name, compiled at its first use.
-    fn kernel(&self, entry_point: &'static str) -> Result<Arc<Kernel>, GpuError> {
+    fn kernel(&self, name: KernelName) -> Result<Arc<Kernel>, GpuError> {
         let mut kernels = self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kernel) = kernels.get(entry_point) {
+        if let Some(kernel) = kernels.get(&name) {
             return Ok(Arc::clone(kernel));
         }
-        let module = STAGE_KERNELS
-            .iter()
-            .find(|(_, name)| *name == entry_point)
-            .map_or("", |(module, _)| module);
+        let (module, entry_point) = name;
         let wgsl = self
             .composer
             .compose(module, entry_point, &Features::default())?;
         let kernel = Arc::new(Kernel::new(&self.gpu, entry_point, &wgsl)?);
-        kernels.insert(entry_point, Arc::clone(&kernel));
+        kernels.insert(name, Arc::clone(&kernel));
         Ok(kernel)
     }
 
@@ -116,20 +107,18 @@ impl GpuStages {
         buffer
     }
 
-    /// One thread for each of `width` x `height`. `buffers` are (group, binding, buffer).
+    /// One thread for each of `width` x `height`. `buffers` by their names in the shader; what the kernel does not read may be among them.
     pub(super) fn dispatch(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        entry_point: &'static str,
-        buffers: &[(u32, u32, &wgpu::Buffer)],
+        kernel: KernelName,
+        buffers: &[(&str, &wgpu::Buffer)],
         (width, height): (u32, u32),
     ) -> Result<(), GpuError> {
-        let kernel = self.kernel(entry_point)?;
-        let groups = kernel.bind(&self.gpu, |group, binding| {
-            buffers
-                .iter()
-                .find(|(g, b, _)| (*g, *b) == (group, binding))
-                .map(|(_, _, buffer)| *buffer)
+        let kernel = self.kernel(kernel)?;
+        let groups = kernel.bind(&self.gpu, |name| {
+            let named = buffers.iter().find(|(given, _)| *given == name);
+            named.map(|(_, buffer)| *buffer)
         })?;
         let mut pass = encoder.begin_compute_pass(&Default::default());
         kernel.set(&mut pass, &groups);

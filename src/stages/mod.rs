@@ -18,6 +18,8 @@ pub mod motion_blur;
 pub mod noise;
 pub(crate) mod settings;
 #[cfg(test)]
+mod test_support;
+#[cfg(test)]
 mod tests;
 
 pub use device::GpuStages;

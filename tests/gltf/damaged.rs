@@ -1,8 +1,8 @@
 //! Sample models damaged at random: an error of one line or a clean scene, and never a panic or a hang.
 
 use super::bad_inputs::{check_outcome, load_guarded};
-use super::shared_data;
-use crate::faults::fuzz::{Random, glb_bytes, glb_value};
+use crate::faults::fuzz::mutate::{Random, glb_bytes, glb_value};
+use crate::support::shared_data;
 
 #[test]
 fn damaged_files_never_panic() {

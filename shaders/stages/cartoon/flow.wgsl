@@ -1,30 +1,7 @@
-// Twin of src/stages/cartoon/flow.rs: one thread a pixel.
+// Twin of src/stages/cartoon/flow.rs.
 
-import package::stages::cartoon::{image_gradients, params, smoothstep_, yuv_at};
-
-struct FlowParams {
-    // Weights of each half Gaussian stand in `weights`, one after the other: tensor, inner, outer, line.
-    tensor_count: u32,
-    inner_count: u32,
-    outer_count: u32,
-    line_count: u32,
-    tau: f32,
-    t0: f32,
-    t1: f32,
-    pad: u32,
-}
-
-@group(1) @binding(0) var<uniform> flow: FlowParams;
-@group(1) @binding(1) var<storage, read> weights: array<f32>;
-@group(1) @binding(2) var<storage, read> field: array<vec4<f32>>;
-@group(1) @binding(3) var<storage, read_write> next_field: array<vec4<f32>>;
-@group(1) @binding(4) var<storage, read_write> lines_out: array<f32>;
-// Brightness.
-@group(1) @binding(5) var<storage, read_write> luma: array<f32>;
-
-fn inside(id: vec3<u32>) -> bool {
-    return id.x < params.width && id.y < params.height;
-}
+import package::stages::cartoon::edges::image_gradients;
+import package::stages::cartoon::gpu::{field, flow, luma, params, weights};
 
 fn place(x: i32, y: i32) -> u32 {
     let column = u32(clamp(x, 0, i32(params.width) - 1));
@@ -33,19 +10,12 @@ fn place(x: i32, y: i32) -> u32 {
 }
 
 // The structure tensor: xx, xy, yy.
-@compute @workgroup_size(8, 8)
-fn stage_tensor(@builtin(global_invocation_id) id: vec3<u32>) {
-    if !inside(id) {
-        return;
-    }
-    let x = i32(id.x);
-    let y = i32(id.y);
+fn tensor(x: i32, y: i32) -> vec3<f32> {
     let g = image_gradients(x, y);
     let xx = g.x * g.x;
     let xy = g.x * g.y;
     let yy = g.y * g.y;
-    next_field[place(x, y)] = vec4<f32>(xx.x + xx.y + xx.z, xy.x + xy.y + xy.z, yy.x + yy.y + yy.z, 0.0);
-    luma[place(x, y)] = yuv_at(x, y).x;
+    return vec3<f32>(xx.x + xx.y + xx.z, xy.x + xy.y + xy.z, yy.x + yy.y + yy.z);
 }
 
 fn blurred(x: i32, y: i32, dx: i32, dy: i32) -> vec4<f32> {
@@ -57,59 +27,10 @@ fn blurred(x: i32, y: i32, dx: i32, dy: i32) -> vec4<f32> {
     return sum;
 }
 
-@compute @workgroup_size(8, 8)
-fn stage_blur_rows(@builtin(global_invocation_id) id: vec3<u32>) {
-    if inside(id) {
-        next_field[place(i32(id.x), i32(id.y))] = blurred(i32(id.x), i32(id.y), 1, 0);
-    }
-}
-
-@compute @workgroup_size(8, 8)
-fn stage_blur_columns(@builtin(global_invocation_id) id: vec3<u32>) {
-    if inside(id) {
-        next_field[place(i32(id.x), i32(id.y))] = blurred(i32(id.x), i32(id.y), 0, 1);
-    }
-}
-
-fn minor_eigenvector(xx: f32, xy: f32, yy: f32) -> vec2<f32> {
-    let difference = xx - yy;
-    let root = sqrt(difference * difference + 4.0 * xy * xy);
-    var x = root - difference;
-    var y = -2.0 * xy;
-    if difference > 0.0 {
-        x = -2.0 * xy;
-        y = difference + root;
-    }
-    let length = sqrt(x * x + y * y);
-    if length > 0.0 {
-        return vec2<f32>(x / length, y / length);
-    }
-    return vec2<f32>(1.0, 0.0);
-}
-
-fn luma_sample(at_x: f32, at_y: f32) -> f32 {
-    let x = clamp(at_x, 0.0, f32(params.width - 1u));
-    let y = clamp(at_y, 0.0, f32(params.height - 1u));
-    let column = i32(x);
-    let row = i32(y);
-    let fx = x - f32(column);
-    let fy = y - f32(row);
-    let upper = luma[place(column, row)] + (luma[place(column + 1, row)] - luma[place(column, row)]) * fx;
-    let lower = luma[place(column, row + 1)]
-        + (luma[place(column + 1, row + 1)] - luma[place(column, row + 1)]) * fx;
-    return upper + (lower - upper) * fy;
-}
-
-// Tangent x, y and the difference of Gaussians across it.
-@compute @workgroup_size(8, 8)
-fn stage_across(@builtin(global_invocation_id) id: vec3<u32>) {
-    if !inside(id) {
-        return;
-    }
-    let tensor = field[place(i32(id.x), i32(id.y))];
-    let t = minor_eigenvector(tensor.x, tensor.y, tensor.z);
-    let x = f32(id.x);
-    let y = f32(id.y);
+// The difference of Gaussians across the contour's tangent `t`.
+fn across(column: u32, row: u32, t: vec2<f32>) -> f32 {
+    let x = f32(column);
+    let y = f32(row);
     var sum = 0.0;
     for (var step = 0u; step < flow.outer_count; step++) {
         var inner = 0.0;
@@ -125,7 +46,46 @@ fn stage_across(@builtin(global_invocation_id) id: vec3<u32>) {
         }
         sum += weight * value;
     }
-    next_field[place(i32(id.x), i32(id.y))] = vec4<f32>(t, sum, 0.0);
+    return sum;
+}
+
+// The differences averaged along the contour.
+fn along(column: u32, row: u32) -> f32 {
+    let here = field[place(i32(column), i32(row))];
+    let first = flow.tensor_count + flow.inner_count + flow.outer_count;
+    var sum = weights[first] * here.z;
+    for (var side = 0; side < 2; side++) {
+        var at = vec2<f32>(f32(column), f32(row));
+        var direction = here.xy;
+        if side == 1 {
+            direction = -direction;
+        }
+        for (var step = 1u; step < flow.line_count; step++) {
+            at += direction;
+            sum += weights[first + step] * across_sample(at.x, at.y);
+            // A contour has no direction of its own: keep going the same way.
+            let near = tangent_nearest(at.x, at.y);
+            if near.x * direction.x + near.y * direction.y < 0.0 {
+                direction = -near;
+            } else {
+                direction = near;
+            }
+        }
+    }
+    return sum;
+}
+
+fn luma_sample(at_x: f32, at_y: f32) -> f32 {
+    let x = clamp(at_x, 0.0, f32(params.width - 1u));
+    let y = clamp(at_y, 0.0, f32(params.height - 1u));
+    let column = i32(x);
+    let row = i32(y);
+    let fx = x - f32(column);
+    let fy = y - f32(row);
+    let upper = luma[place(column, row)] + (luma[place(column + 1, row)] - luma[place(column, row)]) * fx;
+    let lower = luma[place(column, row + 1)]
+        + (luma[place(column + 1, row + 1)] - luma[place(column, row + 1)]) * fx;
+    return upper + (lower - upper) * fy;
 }
 
 fn across_sample(at_x: f32, at_y: f32) -> f32 {
@@ -148,30 +108,18 @@ fn tangent_nearest(x: f32, y: f32) -> vec2<f32> {
     return field[place(column, row)].xy;
 }
 
-@compute @workgroup_size(8, 8)
-fn stage_along(@builtin(global_invocation_id) id: vec3<u32>) {
-    if !inside(id) {
-        return;
+fn minor_eigenvector(xx: f32, xy: f32, yy: f32) -> vec2<f32> {
+    let difference = xx - yy;
+    let root = sqrt(difference * difference + 4.0 * xy * xy);
+    var x = root - difference;
+    var y = -2.0 * xy;
+    if difference > 0.0 {
+        x = -2.0 * xy;
+        y = difference + root;
     }
-    let here = field[place(i32(id.x), i32(id.y))];
-    let first = flow.tensor_count + flow.inner_count + flow.outer_count;
-    var sum = weights[first] * here.z;
-    for (var side = 0; side < 2; side++) {
-        var at = vec2<f32>(f32(id.x), f32(id.y));
-        var direction = here.xy;
-        if side == 1 {
-            direction = -direction;
-        }
-        for (var step = 1u; step < flow.line_count; step++) {
-            at += direction;
-            sum += weights[first + step] * across_sample(at.x, at.y);
-            let near = tangent_nearest(at.x, at.y);
-            if near.x * direction.x + near.y * direction.y < 0.0 {
-                direction = -near;
-            } else {
-                direction = near;
-            }
-        }
+    let length = sqrt(x * x + y * y);
+    if length > 0.0 {
+        return vec2<f32>(x / length, y / length);
     }
-    lines_out[place(i32(id.x), i32(id.y))] = smoothstep_(flow.t0, flow.t1, -sum);
+    return vec2<f32>(1.0, 0.0);
 }

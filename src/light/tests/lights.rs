@@ -35,7 +35,7 @@ fn the_alias_table_has_the_stated_probabilities() {
         for (i, light) in scene.lights.iter().enumerate() {
             let stays = f64::from(light.alias_threshold);
             found[i] += stays / n as f64;
-            found[light.alias as usize] += (1.0 - stays) / n as f64;
+            found[light.alias_light as usize] += (1.0 - stays) / n as f64;
         }
         let stated: Vec<f64> = scene.lights.iter().map(|l| l.select_pdf.into()).collect();
         assert!((stated.iter().sum::<f64>() - 1.0).abs() < 1e-6);

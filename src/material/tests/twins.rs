@@ -104,7 +104,7 @@ fn scattering_inputs(count: usize) -> Vec<(Surface, Vec3, Vec3, [f32; 3])> {
 }
 
 const PRELUDE: &str = "
-import package::packed::bindings::NONE;
+import package::shared::NONE;
 import package::material::bsdf::{bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_is_delta, bsdf_sample};
 import package::material::surface::Surface;
 ";
@@ -230,7 +230,7 @@ fn textures_agree_with_their_twin() {
         ..SceneParts::default()
     };
     let scene = SceneBuffers::from_parts(gpu, &parts).expect("uploads");
-    let prelude = "import package::packed::bindings::texture_refs; import package::material::texture::texture_sample;";
+    let prelude = "import package::gpu::buffers::texture_refs; import package::material::texture::texture_sample;";
     let body =
         "let c = texture_sample(texture_refs[input(0u)], vec2<f32>(input_f32(1u), input_f32(2u)));
         output_vec3(0u, c.xyz); output_f32(3u, c.w);";
@@ -374,24 +374,27 @@ import package::accel::trace::Hit;
     let traces: [(&str, &[&str]); 7] = [
         (
             "textures",
-            &["material_texture_texture_sample", "packed_bindings_texels"],
+            &["material_texture__texture_sample", "gpu_buffers__texels"],
         ),
-        ("normal_maps", &["material_normal_mapped_normal"]),
+        ("normal_maps", &["material_normal__mapped_normal"]),
         (
             "transmission",
-            &["material_ggx_ggx_refract", "material_fresnel_refract_about"],
+            &[
+                "material_ggx__ggx_refract",
+                "material_fresnel__refract_about",
+            ],
         ),
-        ("clearcoat", &["material_bsdf_sample_coat"]),
+        ("clearcoat", &["material_bsdf__sample_coat"]),
         (
             "rough_specular",
             &[
-                "material_lobes_lobes_at",
-                "material_ggx_ggx_d",
-                "material_normal_valid_shading_normal",
+                "material_lobes__lobes_at",
+                "material_ggx__ggx_d",
+                "material_normal__valid_shading_normal",
             ],
         ),
-        ("photo_albedo", &["material_surface_photo_albedo_at"]),
-        ("alpha", &["material_surface_coverage_of"]),
+        ("photo_albedo", &["material_surface__photo_albedo_at"]),
+        ("alpha", &["material_surface__coverage_of"]),
     ];
     let all = compose(&Features::all());
     for (feature, names) in traces {

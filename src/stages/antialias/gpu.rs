@@ -1,20 +1,22 @@
-//! Host side of `shaders/stages/antialias.wgsl`.
+//! Host side of `shaders/stages/antialias/gpu.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 
 use super::AntialiasSettings;
 use crate::film::Picture;
 use crate::gpu::GpuError;
+use crate::shared::shared;
 use crate::stages::GpuStages;
 use crate::stages::antialias::is_binary;
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-pub(in crate::stages) struct AntialiasParams {
-    width: u32,
-    height: u32,
-    beta: f32,
-    pad: u32,
+shared! {
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    struct AntialiasParams {
+        width: u32,
+        height: u32,
+        beta: f32,
+        pad: u32,
+    }
 }
 
 impl GpuStages {
@@ -44,12 +46,12 @@ impl GpuStages {
         let mut encoder = self.encoder();
         self.dispatch(
             &mut encoder,
-            "stage_antialias",
+            (SHARED.path(), "stage_antialias"),
             &[
-                (0, 0, &params),
-                (0, 1, &source),
-                (0, 2, &mask),
-                (0, 3, &result),
+                ("params", &params),
+                ("source", &source),
+                ("mask", &mask),
+                ("picture", &result),
             ],
             (picture.width, picture.height),
         )?;

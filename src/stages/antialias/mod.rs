@@ -2,10 +2,12 @@
 //!
 //! J. Fischer, D. Bartz: Handling Photographic Imperfections and Aliasing in Augmented Reality (WSI-2006-03), section 4, its equations 9
 //! and 10: b = (v + sum of the real ones among the 3 x 3 neighbours) / (1 + their number), and beta b + (1 - beta) v is shown. In linear
-//! light. The twin for the GPU is `shaders/stages/antialias.wgsl`.
+//! light. The twin for the GPU is `shaders/stages/antialias/mod.wgsl`.
 
-pub(super) mod gpu;
+mod gpu;
 pub(super) mod settings;
+#[cfg(test)]
+mod tests;
 
 use rayon::prelude::*;
 
@@ -17,6 +19,7 @@ pub use settings::AntialiasSettings;
 
 pub(super) const STAGE: Stage = Stage {
     name: "antialias",
+    declared: &[&gpu::SHARED],
     wants: |shot| shot.scene.stages.antialias.is_some(),
     run,
 };
@@ -54,29 +57,41 @@ pub fn antialias(picture: &mut Picture, mask: &[f32], settings: &AntialiasSettin
         .enumerate()
         .for_each(|(y, row)| {
             for (x, value) in row.iter_mut().enumerate() {
-                if mask[y * width + x] == 0.0 {
-                    continue;
-                }
-                let mut sum = [0.0f32; 3];
-                let mut count = 1.0f32;
-                for near_y in y.saturating_sub(1)..(y + 2).min(height) {
-                    for near_x in x.saturating_sub(1)..(x + 2).min(width) {
-                        let near = near_y * width + near_x;
-                        if mask[near] == 0.0 {
-                            for c in 0..3 {
-                                // Of differences: a sum of bright values would overflow.
-                                sum[c] += source[near][c] - value[c];
-                            }
-                            count += 1.0;
-                        }
-                    }
-                }
-                if count > 1.0 {
-                    for c in 0..3 {
-                        value[c] += settings.beta * (sum[c] / count);
-                    }
+                if mask[y * width + x] != 0.0 {
+                    *value = blended(&source, mask, (width, height), (x, y), settings.beta);
                 }
             }
         });
     true
+}
+
+/// The virtual pixel in that column and row of `source`, mixed with the real ones among its neighbours.
+fn blended(
+    source: &[[f32; 3]],
+    mask: &[f32],
+    (width, height): (usize, usize),
+    (column, row): (usize, usize),
+    beta: f32,
+) -> [f32; 3] {
+    let mut value = source[row * width + column];
+    let mut sum = [0.0f32; 3];
+    let mut count = 1.0f32;
+    for y in row.saturating_sub(1)..(row + 2).min(height) {
+        for x in column.saturating_sub(1)..(column + 2).min(width) {
+            let near = y * width + x;
+            if mask[near] == 0.0 {
+                for c in 0..3 {
+                    // Of differences: a sum of bright values would overflow.
+                    sum[c] += source[near][c] - value[c];
+                }
+                count += 1.0;
+            }
+        }
+    }
+    if count > 1.0 {
+        for c in 0..3 {
+            value[c] += beta * (sum[c] / count);
+        }
+    }
+    value
 }

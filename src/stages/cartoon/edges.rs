@@ -1,4 +1,4 @@
-//! Sobel edges in Y, U and V: equation 4.
+//! Sobel edges in Y, U and V: equation 4. Twin of `shaders/stages/cartoon/edges.wgsl`.
 
 use rayon::prelude::*;
 
@@ -40,7 +40,7 @@ pub(super) fn sobel(above: [f32; 3], here: [f32; 2], below: [f32; 3]) -> (f32, f
 }
 
 /// 0 up to `low`, 1 from `high` on, Hermite between.
-pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
+pub(super) fn smoothstep_(low: f32, high: f32, x: f32) -> f32 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }

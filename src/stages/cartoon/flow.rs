@@ -2,12 +2,13 @@
 //!
 //! H. Kang, S. Lee, C. K. Chui: Coherent Line Drawing (2007), with the contour directions from the smoothed structure tensor (J. E.
 //! Kyprianidis, J. Doellner: Image Abstraction by Structure Adaptive Filtering, 2008): across the contour a difference of Gaussians
-//! answers below 0 on the dark side of an edge; along the contour the answers are averaged, so that noise does not break a line.
+//! answers below 0 on the dark side of an edge; along the contour the answers are averaged, so that noise does not break a line. Twin of
+//! `shaders/stages/cartoon/flow.wgsl`.
 
 use rayon::prelude::*;
 
 use super::FlowSettings;
-use super::edges::{smoothstep, sobel};
+use super::edges::{smoothstep_, sobel};
 use super::planes::{PAD, Planes};
 
 /// Ratio of the outer Gaussian's standard deviation to the inner one's, which makes the difference nearest to a Laplacian.
@@ -98,47 +99,69 @@ pub fn flow_weights(settings: &FlowSettings) -> [Vec<f32>; 4] {
 /// How dark a line is at each pixel, 0 to 1, row-major.
 pub(super) fn lines(image: &Planes, settings: &FlowSettings) -> Vec<f32> {
     let (width, height) = (image.width, image.height);
-    let [tensor, inner, outer, along] = flow_weights(settings);
+    let [tensor, inner, outer, line] = flow_weights(settings);
     let tangents = tangents(image, &tensor);
     let luma = Field::new(width, height, |x, y| image.row(0, y as isize)[PAD + x]);
-
-    let across = Field::new(width, height, |x, y| {
-        let (tx, ty) = tangents.at(x, y);
-        let (x, y) = (x as f32, y as f32);
-        let mut sum = 0.0;
-        for (step, outer) in outer.iter().enumerate() {
-            let weight = inner.get(step).copied().unwrap_or(0.0) - settings.tau * outer;
-            let s = step as f32;
-            let value = luma.sample(x + s * ty, y - s * tx);
-            sum += weight
-                * if step == 0 {
-                    value
-                } else {
-                    value + luma.sample(x - s * ty, y + s * tx)
-                };
-        }
-        sum
+    let answers = Field::new(width, height, |x, y| {
+        across(
+            &luma,
+            x,
+            y,
+            tangents.at(x, y),
+            [&inner, &outer],
+            settings.tau,
+        )
     });
-
     Field::new(width, height, |x, y| {
-        let (tx, ty) = tangents.at(x, y);
-        let mut sum = along[0] * across.values[y * width + x];
-        for sign in [1.0, -1.0] {
-            let (mut px, mut py) = (x as f32, y as f32);
-            let (mut dx, mut dy) = (sign * tx, sign * ty);
-            for weight in &along[1..] {
-                px += dx;
-                py += dy;
-                sum += weight * across.sample(px, py);
-                let (nx, ny) = tangents.nearest(px, py);
-                // A contour has no direction of its own: keep going the same way.
-                let flip = if nx * dx + ny * dy < 0.0 { -1.0 } else { 1.0 };
-                (dx, dy) = (flip * nx, flip * ny);
-            }
-        }
-        smoothstep(settings.t0, settings.t1, -sum)
+        let sum = along(&answers, &tangents, x, y, &line);
+        smoothstep_(settings.t0, settings.t1, -sum)
     })
     .values
+}
+
+/// The difference of Gaussians across the contour of tangent (tx, ty) through a pixel.
+fn across(
+    luma: &Field,
+    x: usize,
+    y: usize,
+    (tx, ty): (f32, f32),
+    [inner, outer]: [&[f32]; 2],
+    tau: f32,
+) -> f32 {
+    let (x, y) = (x as f32, y as f32);
+    let mut sum = 0.0;
+    for (step, outer) in outer.iter().enumerate() {
+        let weight = inner.get(step).copied().unwrap_or(0.0) - tau * outer;
+        let s = step as f32;
+        let value = luma.sample(x + s * ty, y - s * tx);
+        sum += weight
+            * if step == 0 {
+                value
+            } else {
+                value + luma.sample(x - s * ty, y + s * tx)
+            };
+    }
+    sum
+}
+
+/// The answers across the contour, averaged along it on both sides of a pixel.
+fn along(answers: &Field, tangents: &Tangents, x: usize, y: usize, weights: &[f32]) -> f32 {
+    let (tx, ty) = tangents.at(x, y);
+    let mut sum = weights[0] * answers.values[y * answers.width + x];
+    for sign in [1.0, -1.0] {
+        let (mut px, mut py) = (x as f32, y as f32);
+        let (mut dx, mut dy) = (sign * tx, sign * ty);
+        for weight in &weights[1..] {
+            px += dx;
+            py += dy;
+            sum += weight * answers.sample(px, py);
+            let (nx, ny) = tangents.nearest(px, py);
+            // A contour has no direction of its own: keep going the same way.
+            let flip = if nx * dx + ny * dy < 0.0 { -1.0 } else { 1.0 };
+            (dx, dy) = (flip * nx, flip * ny);
+        }
+    }
+    sum
 }
 
 /// Unit vectors along the contours.

@@ -1,41 +1,45 @@
-//! Host side of `shaders/stages/cartoon/mod.wgsl` and `shaders/stages/cartoon/flow.wgsl`.
+//! Host side of `shaders/stages/cartoon/gpu.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 
 use super::{CartoonSettings, CartoonStyle, FlowSettings};
 use crate::gpu::GpuError;
+use crate::shared::shared;
 use crate::stages::EncodedImage;
 use crate::stages::GpuStages;
 use crate::stages::cartoon::{Cartoon, EdgeResponses, flow_weights};
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-pub(in crate::stages) struct CartoonParams {
-    width: u32,
-    height: u32,
-    small_width: u32,
-    small_height: u32,
-    factor: f32,
-    alpha: f32,
-    beta: f32,
-    s0: f32,
-    s1: f32,
-    a0: f32,
-    a1: f32,
-    flow: u32,
-}
+shared! {
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    struct CartoonParams {
+        width: u32,
+        height: u32,
+        small_width: u32,
+        small_height: u32,
+        /// -1 / (2 sigma_p^2).
+        factor: f32,
+        alpha: f32,
+        beta: f32,
+        s0: f32,
+        s1: f32,
+        a0: f32,
+        a1: f32,
+        /// 1: `lines` hold the silhouettes.
+        flow: u32,
+    }
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-pub(in crate::stages) struct FlowParams {
-    tensor_count: u32,
-    inner_count: u32,
-    outer_count: u32,
-    line_count: u32,
-    tau: f32,
-    t0: f32,
-    t1: f32,
-    pad: u32,
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    struct FlowParams {
+        /// Weights of each half Gaussian stand in `weights`, one after the other: tensor, inner, outer, line.
+        tensor_count: u32,
+        inner_count: u32,
+        outer_count: u32,
+        line_count: u32,
+        tau: f32,
+        t0: f32,
+        t1: f32,
+        pad: u32,
+    }
 }
 
 impl GpuStages {
@@ -82,12 +86,12 @@ impl GpuStages {
             .chain(["stage_respond"]);
         for pass in passes {
             let buffers = [
-                (0, 0, &params),
-                (0, 1, &pixels),
-                (0, 2, &simplified),
-                (0, 3, &next),
+                ("params", &params),
+                ("image", &pixels),
+                ("simplified", &simplified),
+                ("next", &next),
             ];
-            self.dispatch(&mut encoder, pass, &buffers, small)?;
+            self.dispatch(&mut encoder, (SHARED.path(), pass), &buffers, small)?;
             std::mem::swap(&mut simplified, &mut next);
         }
         let lines = match settings.style {
@@ -97,13 +101,18 @@ impl GpuStages {
             }
         };
         let buffers = [
-            (0, 0, &params),
-            (0, 1, &pixels),
-            (0, 2, &simplified),
-            (0, 4, &lines),
-            (0, 5, &result),
+            ("params", &params),
+            ("image", &pixels),
+            ("simplified", &simplified),
+            ("lines", &lines),
+            ("result", &result),
         ];
-        self.dispatch(&mut encoder, "stage_compose", &buffers, size)?;
+        self.dispatch(
+            &mut encoder,
+            (SHARED.path(), "stage_compose"),
+            &buffers,
+            size,
+        )?;
         let words = if with_edges { 6 * count } else { 3 * count };
         let words = self.finish(encoder, &result, words)?;
         let (rgb, planes) = words.split_at(3 * count);
@@ -159,16 +168,16 @@ impl GpuStages {
             "stage_along",
         ] {
             let buffers = [
-                (0, 0, params),
-                (0, 1, pixels),
-                (1, 0, &flow),
-                (1, 1, &weights),
-                (1, 2, &field),
-                (1, 3, &next),
-                (1, 4, &lines),
-                (1, 5, &luma),
+                ("params", params),
+                ("image", pixels),
+                ("flow", &flow),
+                ("weights", &weights),
+                ("field", &field),
+                ("next_field", &next),
+                ("lines_out", &lines),
+                ("luma", &luma),
             ];
-            self.dispatch(encoder, pass, &buffers, size)?;
+            self.dispatch(encoder, (SHARED.path(), pass), &buffers, size)?;
             std::mem::swap(&mut field, &mut next);
         }
         Ok(lines)

@@ -9,33 +9,39 @@
 //!
 //! Everything is done on encoded sRGB values in 0..=1 and BT.601 YUV. Where the paper leaves it open: borders repeat, Sobel sums are
 //! divided by 4, pixel centres lie at halves, and the enlarged colours and responses are interpolated linearly. The twin for the GPU is
-//! `shaders/stages/cartoon/mod.wgsl`.
+//! `shaders/stages/cartoon/`.
 
 mod edges;
 mod flow;
-pub(super) mod gpu;
+mod gpu;
 mod planes;
 pub(super) mod settings;
 mod simplify;
+#[cfg(test)]
+mod tests;
 
 use rayon::prelude::*;
 
 use super::finish::{Shot, Stage};
 use super::{EncodedImage, GpuStages};
 use crate::gpu::GpuError;
-use edges::{gradient_row, smoothstep};
+use crate::shared::shared;
+use edges::{gradient_row, smoothstep_};
 pub use flow::flow_weights;
 use planes::{PAD, Planes, rgb_from_yuv};
 pub use settings::{CartoonSettings, CartoonStyle, FlowSettings};
 
-/// Red and blue weights of brightness (BT.601); green has the rest.
-const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
-/// Largest values of U and V.
-const U_MAX: f32 = 0.436;
-const V_MAX: f32 = 0.615;
+shared! {
+    /// Weights of red, green and blue in brightness (BT.601).
+    const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
+    /// Largest values of U and V.
+    const U_MAX: f32 = 0.436;
+    const V_MAX: f32 = 0.615;
+}
 
 pub(super) const STAGE: Stage = Stage {
     name: "cartoon",
+    declared: &[&SHARED, &gpu::SHARED, &planes::SHARED, &simplify::SHARED],
     wants: |shot| shot.scene.stages.cartoon.is_some(),
     run,
 };
@@ -129,8 +135,8 @@ fn compose(
                             silhouette.iter_mut().zip(edge_s.iter()).zip(edge_a.iter())
                         {
                             *silhouette = (1.0 - settings.beta)
-                                * smoothstep(settings.s0, settings.s1, *s)
-                                + settings.beta * smoothstep(settings.a0, settings.a1, *a);
+                                * smoothstep_(settings.s0, settings.s1, *s)
+                                + settings.beta * smoothstep_(settings.a0, settings.a1, *a);
                         }
                     }
                 }
@@ -158,12 +164,17 @@ struct Tap {
     weight: f32,
 }
 
+/// Where pixel `index` of `large` ones lies among `small` ones.
+fn tap(index: usize, large: usize, small: usize) -> f32 {
+    let scale = small as f32 / large as f32;
+    ((index as f32 + 0.5) * scale - 0.5).clamp(0.0, (small - 1) as f32)
+}
+
 /// Where each of `large` pixels lies among `small` ones.
 fn taps(large: usize, small: usize) -> Vec<Tap> {
-    let scale = small as f32 / large as f32;
     (0..large)
         .map(|index| {
-            let at = ((index as f32 + 0.5) * scale - 0.5).clamp(0.0, (small - 1) as f32);
+            let at = tap(index, large, small);
             let first = at as usize;
             Tap {
                 first,

@@ -1,12 +1,16 @@
-//! A picture as three planes, Y, U and V, with columns repeated at both ends so that a filter's window never leaves a row.
+//! A picture as three planes, Y, U and V, with columns repeated at both ends so that a filter's window never leaves a row. Twin of
+//! `shaders/stages/cartoon/planes.wgsl`, which computes Y, U and V where they are read.
 
 use rayon::prelude::*;
 
 use super::{LUMA, U_MAX, V_MAX};
+use crate::shared::shared;
 use crate::stages::EncodedImage;
 
-/// Columns beyond each end of a row: half of the 5 x 5 window.
-pub(super) const PAD: usize = 2;
+shared! {
+    /// Columns beyond each end of a row: half of the 5 x 5 window.
+    pub(super) const PAD: usize = 2;
+}
 
 #[derive(Clone, Debug)]
 pub(super) struct Planes {

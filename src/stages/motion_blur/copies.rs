@@ -3,7 +3,7 @@
 //!
 //! J. Fischer, D. Bartz: Handling Photographic Imperfections and Aliasing in Augmented Reality (WSI-2006-03), section 5, its equations 11 and
 //! 12. Where k of n copies cover a pixel their opacity is 1 - (1 - 1/n)^k. In linear light; for several objects, the farthest first. The twin
-//! for the GPU is `shaders/stages/copies.wgsl`.
+//! for the GPU is `shaders/stages/motion_blur/copies.wgsl`.
 
 use rayon::prelude::*;
 
@@ -111,13 +111,17 @@ fn layer_at(layer: &[[f32; 4]], width: u32, height: u32, x: f32, y: f32) -> [f32
         (0.0, 1.0, (1.0 - along) * down),
         (1.0, 1.0, along * down),
     ] {
-        let (column, row) = (left + dx, top + dy);
-        if column >= 0.0 && row >= 0.0 && column < width as f32 && row < height as f32 {
-            let value = layer[row as usize * width as usize + column as usize];
-            for c in 0..4 {
-                sum[c] += weight * value[c];
-            }
+        let value = texel(layer, width, height, left + dx, top + dy);
+        for c in 0..4 {
+            sum[c] += weight * value[c];
         }
     }
     sum
+}
+
+fn texel(layer: &[[f32; 4]], width: u32, height: u32, column: f32, row: f32) -> [f32; 4] {
+    if column >= 0.0 && row >= 0.0 && column < width as f32 && row < height as f32 {
+        return layer[row as usize * width as usize + column as usize];
+    }
+    [0.0; 4]
 }

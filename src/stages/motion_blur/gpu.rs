@@ -1,24 +1,26 @@
-//! Host side of `shaders/stages/copies.wgsl`.
+//! Host side of `shaders/stages/motion_blur/gpu.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 
 use super::Copies;
 use crate::gpu::GpuError;
+use crate::shared::shared;
 use crate::stages::GpuStages;
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-pub(in crate::stages) struct CopiesParams {
-    width: u32,
-    height: u32,
-    count: u32,
-    opacity: f32,
-    start: [f32; 2],
-    step: [f32; 2],
-    centre_opacity: f32,
-    pad_0: u32,
-    pad_1: u32,
-    pad_2: u32,
+shared! {
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    struct CopiesParams {
+        width: u32,
+        height: u32,
+        count: u32,
+        opacity: f32,
+        start: [f32; 2],
+        step: [f32; 2],
+        centre_opacity: f32,
+        pad_0: u32,
+        pad_1: u32,
+        pad_2: u32,
+    }
 }
 
 impl GpuStages {
@@ -50,8 +52,8 @@ impl GpuStages {
             let layer = self.array("layer", layer.as_flattened())?;
             self.dispatch(
                 &mut encoder,
-                "stage_copies",
-                &[(0, 0, &params), (0, 1, &layer), (0, 2, &result)],
+                (SHARED.path(), "stage_copies"),
+                &[("params", &params), ("layer", &layer), ("canvas", &result)],
                 (width, height),
             )?;
         }

@@ -1,9 +1,11 @@
 //! Motion blur by copies along the motion in the picture.
 
 mod copies;
-pub(super) mod gpu;
+mod gpu;
 pub(super) mod settings;
 mod stage;
+#[cfg(test)]
+mod tests;
 
 pub use copies::{Copies, CopyLayer, draw_copies};
 pub use settings::{MotionBlurMethod, MotionBlurSettings};

@@ -1,14 +1,17 @@
 //! Normal deviates for every pixel of every frame, drawn by hash and correlated as the camera's noise is. Twin of
-//! `shaders/stages/noise/mod.wgsl`.
+//! `shaders/stages/noise/field.wgsl`.
 
 use std::ops::Range;
 
 use super::kernel::{KERNEL_SIDE, fit_kernel, overlap};
 use crate::math::{hash_combine, log_, sincos_2pi, uniform_from_bits};
+use crate::shared::shared;
 use crate::stages::settings::{LAGS, NoiseProfile};
 
-/// Coordinates are shifted by this before they are hashed: pixels beyond the left and top borders have numbers too.
-const MARGIN: u32 = 16;
+shared! {
+    /// Coordinates are shifted by this before they are hashed: pixels beyond the left and top borders have numbers too.
+    const MARGIN: u32 = 16;
+}
 
 /// Correlations below this are not worth a convolution.
 const WHITE_ENOUGH: f64 = 0.01;
@@ -110,8 +113,8 @@ impl<'a> FieldBand<'a> {
         }
     }
 
-    /// Row `y`, by channel.
-    pub fn row(&self, y: usize) -> [Vec<f32>; 3] {
+    /// Row `y` of the deviates, by channel, correlated by the kernels.
+    pub fn correlated(&self, y: usize) -> [Vec<f32>; 3] {
         let first = y - self.first_row;
         if self.field.kernels.is_empty() {
             return self.white[first].clone();

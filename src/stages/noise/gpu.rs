@@ -1,32 +1,35 @@
-//! Host side of `shaders/stages/noise/mod.wgsl`.
+//! Host side of `shaders/stages/noise/gpu.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::film::Picture;
 use crate::gpu::GpuError;
+use crate::shared::shared;
 use crate::stages::GpuStages;
 use crate::stages::noise::{NoiseInput, NoiseSource, NoiseStage, sigma_table};
 use crate::stages::settings::LAGS;
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-pub(in crate::stages) struct NoiseParams {
-    width: u32,
-    height: u32,
-    bins: u32,
-    seed: u32,
-    frame: u32,
-    reach: u32,
-    has_photo: u32,
-    texture_size: u32,
-    scale: f32,
-    magnification: f32,
-    rotation_sin: f32,
-    rotation_cos: f32,
-    offset_x: f32,
-    offset_y: f32,
-    pad0: u32,
-    pad1: u32,
+shared! {
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    struct NoiseParams {
+        width: u32,
+        height: u32,
+        bins: u32,
+        seed: u32,
+        frame: u32,
+        /// Of the kernels, pixels; 0 where the noise is white.
+        reach: u32,
+        has_photo: u32,
+        texture_size: u32,
+        scale: f32,
+        magnification: f32,
+        rotation_sin: f32,
+        rotation_cos: f32,
+        offset_x: f32,
+        offset_y: f32,
+        pad0: u32,
+        pad1: u32,
+    }
 }
 
 impl GpuStages {
@@ -84,17 +87,22 @@ impl GpuStages {
                 let white = self.room("noise", 4 * wide.0 as usize * wide.1 as usize)?;
                 let params = self.uniform(&params);
                 let buffers = [
-                    (0, 0, &params),
-                    (0, 1, &values),
-                    (0, 2, &photo),
-                    (0, 3, &mask),
-                    (0, 4, &ratio),
-                    (0, 5, &variance),
-                    (0, 6, &weights),
-                    (0, 7, &white),
+                    ("params", &params),
+                    ("picture", &values),
+                    ("photo", &photo),
+                    ("mask", &mask),
+                    ("ratio", &ratio),
+                    ("variance", &variance),
+                    ("weights", &weights),
+                    ("white", &white),
                 ];
-                self.dispatch(&mut encoder, "stage_white", &buffers, wide)?;
-                self.dispatch(&mut encoder, "stage_missing", &buffers, size)?;
+                self.dispatch(&mut encoder, (SHARED.path(), "stage_white"), &buffers, wide)?;
+                self.dispatch(
+                    &mut encoder,
+                    (SHARED.path(), "stage_missing"),
+                    &buffers,
+                    size,
+                )?;
             }
             NoiseSource::Textures(textures) => {
                 let placement = textures.placement(frame);
@@ -106,12 +114,17 @@ impl GpuStages {
                 let texels = self.array("noise textures", &texels)?;
                 let params = self.uniform(&params);
                 let buffers = [
-                    (0, 0, &params),
-                    (0, 1, &values),
-                    (0, 3, &mask),
-                    (0, 8, &texels),
+                    ("params", &params),
+                    ("picture", &values),
+                    ("mask", &mask),
+                    ("textures", &texels),
                 ];
-                self.dispatch(&mut encoder, "stage_textures", &buffers, size)?;
+                self.dispatch(
+                    &mut encoder,
+                    (SHARED.path(), "stage_textures"),
+                    &buffers,
+                    size,
+                )?;
             }
         }
         let words = self.finish(encoder, &values, 3 * count)?;

@@ -1,7 +1,7 @@
-//! How much noise a pixel lacks. Twin of `shaders/stages/noise/mod.wgsl`.
+//! How much noise a pixel lacks. Twin of `shaders/stages/noise/missing.wgsl`.
 
 use super::BIN_SHIFT;
-use crate::stages::curve::{decode_slope, encode_};
+use crate::stages::curve::{decode_slope, encode_rgb};
 use crate::stages::settings::NoiseProfile;
 
 /// Sigma by bin and channel, DN.
@@ -37,7 +37,7 @@ pub fn missing_sigma(
     variance: [f32; 3],
 ) -> [f32; 3] {
     let wanted = sigma_of(table, encoded);
-    let encoded_photo = photo.map(encode_);
+    let encoded_photo = encode_rgb(photo);
     let photo_sigma = sigma_of(table, encoded_photo);
     let mut sigma = [0.0; 3];
     for c in 0..3 {

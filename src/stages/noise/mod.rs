@@ -16,12 +16,14 @@
 //! rotation for every frame.
 
 mod field;
-pub(super) mod gpu;
+mod gpu;
 mod kernel;
 mod missing;
 mod own_variance;
 pub(super) mod settings;
 mod stage;
+#[cfg(test)]
+mod tests;
 mod textures;
 
 pub use field::{FieldBand, NoiseField, white_deviates};
@@ -35,12 +37,15 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::curve::{decode_, encode_};
+use super::curve::{decode_, encode_rgb};
 use crate::film::Picture;
+use crate::shared::shared;
 
-/// Intensities are shifted by this much before they are sorted into bins, so that no whole code lies on the border of two, where
-/// rounding would decide. DN.
-pub const BIN_SHIFT: f32 = 0.01;
+shared! {
+    /// Intensities are shifted by this much before they are sorted into bins, so that no whole code lies on the border of two, where
+    /// rounding would decide. DN.
+    pub const BIN_SHIFT: f32 = 0.01;
+}
 
 /// Rows that one task works on.
 const BAND: usize = 32;
@@ -133,7 +138,7 @@ impl NoiseStage {
                     .filter(|(index, _)| input.coverage(*index) >= 0.5)
                     .for_each(|(index, value)| {
                         let (x, y) = ((index % width) as f32, (index / width) as f32);
-                        let encoded = value.map(encode_);
+                        let encoded = encode_rgb(*value);
                         let variation = textures.variation(&placement, encoded, x, y);
                         for c in 0..3 {
                             value[c] = decode_(
@@ -178,13 +183,13 @@ impl Band {
             if !any {
                 continue;
             }
-            let noise = band.row(y);
+            let noise = band.correlated(y);
             for x in left..right {
                 let index = y * self.width + x;
                 if input.is_untouched(index, &values[x]) {
                     continue;
                 }
-                let encoded = values[x].map(encode_);
+                let encoded = encode_rgb(values[x]);
                 let sigma = missing_sigma(
                     table,
                     encoded,

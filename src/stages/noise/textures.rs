@@ -1,4 +1,5 @@
-//! The paper's noise textures: one a bin, placed anew for every frame (imperfections 2006, sections 3.3 to 3.5).
+//! The paper's noise textures: one a bin, placed anew for every frame (imperfections 2006, sections 3.3 to 3.5). The twin of
+//! [`Textures::variation`] is in `shaders/stages/noise/textures.wgsl`.
 
 use std::f32::consts::TAU;
 

@@ -3,7 +3,7 @@
 //!
 //! Every input follows from its reader and its number alone, so that what fails once fails again.
 
-mod mutate;
+pub mod mutate;
 mod readers;
 mod seeds;
 
@@ -11,13 +11,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-pub use mutate::{Random, glb_bytes, glb_value};
-pub use readers::Reader;
+use mutate::Random;
+use readers::Reader;
 
 /// Longest that one input may take. Inputs are of a few kilobytes.
 const MAX_TIME: Duration = Duration::from_secs(10);
-/// Most memory that the process may ever have held.
-const MAX_BYTES: u64 = 2 << 30;
 
 /// What a reader made of an input.
 pub enum Outcome {
@@ -129,20 +127,4 @@ fn folder() -> tempfile::TempDir {
     tempfile::tempdir_in(in_memory)
         .or_else(|_| tempfile::tempdir())
         .expect("a temporary folder")
-}
-
-/// That the process has not held more memory than it may.
-///
-/// # Errors
-/// It has.
-pub fn check_memory() -> Result<(), String> {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let peak = status
-        .lines()
-        .find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix("kB"));
-    let peak = peak.and_then(|kilobytes| kilobytes.trim().parse::<u64>().ok());
-    match peak {
-        Some(peak) if peak * 1024 > MAX_BYTES => Err(format!("{peak} kB of memory were held")),
-        _ => Ok(()),
-    }
 }

@@ -8,8 +8,9 @@ use mixray::scene::trajectory::{Trajectory, read_intrinsics};
 use mixray::scene::{NoiseProfile, Photo, load};
 use mixray::video::FrameSource;
 
+use super::mutate::Random;
 use super::mutate::{bytes, glb, png, text};
-use super::{Outcome, Random, seeds};
+use super::{Outcome, seeds};
 
 /// What reads files of a kind.
 pub struct Reader {

@@ -8,7 +8,7 @@ use exr::prelude::{
 };
 use image::{DynamicImage, ImageFormat, RgbImage};
 use mixray::output::{FilmNote, Metadata, Target, write_film};
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{NoiseFit, NoiseProfile, load};
 use serde_json::{Value, json};
 
@@ -78,7 +78,7 @@ pub fn exrs() -> Vec<Vec<u8>> {
 
 fn exr(compression: Compression, blocks: Blocks) -> Vec<u8> {
     let value = |i: usize| (i % 37) as f32 * 0.1;
-    let halves = |from: usize| (0..WIDTH * HEIGHT).map(|i| f16::from_f32(value(i + from)));
+    let halves = |from: usize| (0..WIDTH * HEIGHT).map(move |i| f16::from_f32(value(i + from)));
     let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::from_vec(vec![
         AnyChannel::new("B", FlatSamples::F16(halves(0).collect())),
         AnyChannel::new("G", FlatSamples::F16(halves(5).collect())),
@@ -124,9 +124,9 @@ pub fn films() -> Vec<Vec<u8>> {
         sample_range: Some((0, 2)),
         ..RendererOptions::default()
     };
-    let mut renderer = Renderer::new(scene, options).expect("fits");
+    let mut renderer = Renderer::new(scene, options, &Watcher::none()).expect("fits");
     renderer
-        .advance(Budget::Complete, &|| false, &mut |_| ())
+        .advance(Budget::Complete, &Watcher::none())
         .expect("renders");
     let path = folder.path().join("film.exr");
     let note = FilmNote::new(renderer.scene(), (0, 2), renderer.without());

@@ -5,12 +5,12 @@ use std::time::Instant;
 use crate::clock::ProcessorTime;
 
 /// Started when made.
-pub(super) struct Watch {
+pub(super) struct Stopwatch {
     pub begin: Instant,
     cpu: ProcessorTime,
 }
 
-impl Watch {
+impl Stopwatch {
     pub fn start() -> Self {
         Self {
             begin: Instant::now(),
