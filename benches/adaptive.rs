@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use cpu_time::thread_cpu_secs;
 use mixray::bench::{replace_section, shrink};
 use mixray::film::{Picture, planes};
-use mixray::renderer::{Budget, ErrorGoal, Renderer, RendererOptions, Skip, Stated};
+use mixray::renderer::{Budget, ErrorGoal, Renderer, RendererOptions, Skip, Stated, Watcher};
 use mixray::scene::{BackendChoice, Scene};
 use rayon::prelude::*;
 
@@ -68,8 +68,8 @@ fn goal(standard_error: f64) -> ErrorGoal {
 }
 
 fn to_error(scene: &Scene, standard_error: f64) -> Result<Renderer, Failure> {
-    let mut renderer = Renderer::new(scene.clone(), RendererOptions::default())?;
-    renderer.render_to_error(&goal(standard_error), &|| false, &mut |_| ())?;
+    let mut renderer = Renderer::new(scene.clone(), RendererOptions::default(), &Watcher::none())?;
+    renderer.render_to_error(&goal(standard_error), &Watcher::none())?;
     Ok(renderer)
 }
 
@@ -82,8 +82,8 @@ fn by_rays(
     let mut scene = scene.clone();
     scene.settings.rays_per_pixel = rays;
     scene.settings.seed = seed;
-    let mut renderer = Renderer::new(scene, options)?;
-    renderer.advance(Budget::Complete, &|| false, &mut |_| ())?;
+    let mut renderer = Renderer::new(scene, options, &Watcher::none())?;
+    renderer.advance(Budget::Complete, &Watcher::none())?;
     Ok(renderer)
 }
 

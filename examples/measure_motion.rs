@@ -7,7 +7,7 @@ use std::path::Path;
 
 use glam::{DMat4, DVec3};
 use mixray::film::Picture;
-use mixray::renderer::{Budget, FrameEdit, PreviousView, Renderer, RendererOptions};
+use mixray::renderer::{Budget, FrameEdit, PreviousView, Renderer, RendererOptions, Watcher};
 use mixray::scene::trajectory::CameraPath;
 use mixray::scene::{MotionBlurMethod, MotionBlurSettings, Scene, Shutter};
 use mixray::stages::finish;
@@ -148,19 +148,22 @@ fn load() -> Result<Scene> {
 }
 
 fn renderer(scene: &Scene, path: &CameraPath, seed: u32) -> Result<Renderer> {
-    let mut renderer = Renderer::new(scene.clone(), RendererOptions::default())?;
+    let mut renderer = Renderer::new(scene.clone(), RendererOptions::default(), &Watcher::none())?;
     let mut camera = scene.camera.clone();
     camera.world_from_camera = path.pose(0.0).unwrap_or_default();
-    renderer.set_frame(FrameEdit {
-        photo: None,
-        camera,
-        lens: scene.lens,
-        camera_path: path.clone(),
-        time_secs: 0.0,
-        seed,
-        anchor: None,
-    })?;
-    renderer.advance(Budget::Complete, &|| false, &mut |_| ())?;
+    renderer.set_frame(
+        FrameEdit {
+            photo: None,
+            camera,
+            lens: scene.lens,
+            camera_path: path.clone(),
+            time_secs: 0.0,
+            seed,
+            anchor: None,
+        },
+        &Watcher::none(),
+    )?;
+    renderer.advance(Budget::Complete, &Watcher::none())?;
     Ok(renderer)
 }
 
@@ -172,23 +175,26 @@ fn rendered(scene: &Scene, path: &CameraPath) -> Result<Picture> {
 fn average(scene: &Scene, motion: Motion) -> Result<(Vec<[f64; 3]>, Vec<bool>)> {
     let mut scene = scene.clone();
     scene.settings.rays_per_pixel = FRAME_RAYS;
-    let mut renderer = Renderer::new(scene.clone(), RendererOptions::default())?;
+    let mut renderer = Renderer::new(scene.clone(), RendererOptions::default(), &Watcher::none())?;
     let count = renderer.film().pixels.len();
     let mut sums = vec![[0.0; 3]; count];
     let mut touched = vec![false; count];
     for frame in 0..FRAMES {
         let mut camera = scene.camera.clone();
         camera.world_from_camera = motion((f64::from(frame) + 0.5) / f64::from(FRAMES) - 0.5);
-        renderer.set_frame(FrameEdit {
-            photo: None,
-            camera,
-            lens: scene.lens,
-            camera_path: CameraPath::default(),
-            time_secs: 0.0,
-            seed: 1000 + frame,
-            anchor: None,
-        })?;
-        renderer.advance(Budget::Complete, &|| false, &mut |_| ())?;
+        renderer.set_frame(
+            FrameEdit {
+                photo: None,
+                camera,
+                lens: scene.lens,
+                camera_path: CameraPath::default(),
+                time_secs: 0.0,
+                seed: 1000 + frame,
+                anchor: None,
+            },
+            &Watcher::none(),
+        )?;
+        renderer.advance(Budget::Complete, &Watcher::none())?;
         for (sum, value) in sums.iter_mut().zip(renderer.picture().linear) {
             for c in 0..3 {
                 sum[c] += f64::from(value[c]) / f64::from(FRAMES);

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use mixray::output::{PngBits, Target, write_png};
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Progress, Renderer, RendererOptions, Watcher};
 use mixray::scene::Lens;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -14,22 +14,32 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .nth(1)
         .unwrap_or_else(|| "scenes/demo/scene.toml".to_owned());
     let scene = mixray::scene::load(Path::new(&path))?;
-    let mut renderer = Renderer::new(scene, RendererOptions::default())?;
+    let mut renderer = Renderer::new(scene, RendererOptions::default(), &Watcher::none())?;
 
-    renderer.advance(Budget::Time(Duration::from_secs(1)), &|| false, &mut |_| ())?;
+    renderer.advance(Budget::Time(Duration::from_secs(1)), &Watcher::none())?;
     println!("after a second: {} rays per pixel", renderer.samples());
 
-    renderer.advance(Budget::Complete, &|| false, &mut |p| {
-        eprintln!("{} of {} rays per pixel", p.samples, p.samples_total);
-    })?;
+    let say = |p: &Progress| {
+        let percent = 100.0 * p.share_done;
+        eprintln!(
+            "{}: {percent:.0}%, {} of {} rays per pixel",
+            p.phase.name(),
+            p.samples,
+            p.samples_total
+        );
+    };
+    renderer.advance(Budget::Complete, &Watcher::none().heard_by(&say))?;
     save(&renderer, "focus-1.png")?;
 
     let lens = renderer.scene().lens;
-    renderer.set_lens(Lens {
-        focus_distance_m: 1.5 * lens.focus_distance_m,
-        ..lens
-    })?;
-    renderer.advance(Budget::Complete, &|| false, &mut |_| ())?;
+    renderer.set_lens(
+        Lens {
+            focus_distance_m: 1.5 * lens.focus_distance_m,
+            ..lens
+        },
+        &Watcher::none(),
+    )?;
+    renderer.advance(Budget::Complete, &Watcher::none())?;
     save(&renderer, "focus-2.png")?;
     Ok(())
 }

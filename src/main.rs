@@ -1,3 +1,6 @@
+#[global_allocator]
+static ALLOCATOR: mixray::memory::EndWhenShort = mixray::memory::EndWhenShort;
+
 fn main() -> std::process::ExitCode {
     mixray::cli::run()
 }

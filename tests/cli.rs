@@ -1,117 +1,28 @@
 //! The built program: exit codes, one-line errors, what lands on stdout and on disk.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-/// A photograph, a proxy, and optionally something virtual over it.
-struct Folder(tempfile::TempDir);
+use crate::support::{Folder, assert_refused, interrupt, root, stderr, stdout};
 
 const CAMERA: &str = "[photo]\nimage = \"photo.png\"\n[camera]\nvertical_fov_deg = 45\n[environment]\nradiance = [1, 1, 1]\n";
 const VIRTUAL: &str = "[[virtual]]\nshape = \"sphere\"\nscale = 0.3\ntranslation = [0, 0, -3]\nmaterial = { base_color = [0.5, 0.4, 0.3] }\n";
 
-impl Folder {
-    fn new(scene: &str) -> Self {
-        let folder = Self(tempfile::Builder::new().prefix("demo").tempdir().unwrap());
-        let photo = image::RgbImage::from_fn(24, 16, |x, y| {
-            image::Rgb([(x * 10) as u8, (y * 15) as u8, (x * y) as u8])
-        });
-        photo.save(folder.path("photo.png")).unwrap();
-        std::fs::write(folder.path("scene.toml"), scene).unwrap();
-        folder
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn entries(&self) -> Vec<String> {
-        let mut names: Vec<String> = std::fs::read_dir(self.0.path())
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
-        names.sort();
-        names
-    }
-
-    /// Runs mixray with this folder as the current one.
-    fn run(&self, arguments: &[&str]) -> Output {
-        command(self.0.path(), arguments).output().unwrap()
-    }
-}
-
-fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mixray"));
-    command.current_dir(folder).args(arguments);
-    command
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-/// Exit code 2 and one line that begins with "error:" and holds `part`.
-fn assert_refused(output: &Output, part: &str) {
-    let message = stderr(output);
-    assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.starts_with("error:"), "{message}");
-    assert!(message.contains(part), "{message} lacks {part}");
-    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
-    assert!(output.stdout.is_empty());
-}
-
 /// Invariant 1 from the outside, and the default name of the picture.
 #[test]
 fn nothing_virtual_gives_the_photograph_back() {
-    let folder = Folder::new(CAMERA);
-    let output = folder.run(&["render", "scene.toml", "--backend", "cpu"]);
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let name = folder.0.path().file_name().unwrap().to_string_lossy();
-    let picture = format!("{name}.png");
-    assert!(
-        stdout(&output).contains(&picture),
-        "says where the picture is"
-    );
-    let open = |name: &str| image::open(folder.path(name)).unwrap().into_rgb8();
-    assert_eq!(open(&picture), open("photo.png"));
-    let output = folder.run(&["compare", &picture, "photo.png", "--max-rmse", "0"]);
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let folder = Folder::with_scene(CAMERA);
+    let said = folder.succeed("render scene.toml --backend cpu");
+    let picture = format!("{}.png", folder.name());
+    assert!(said.contains(&picture), "says where the picture is");
+    assert_eq!(folder.open(&picture), folder.open("photo.png"));
+    folder.succeed(&format!("compare {picture} photo.png --max-rmse 0"));
 }
 
 #[test]
 fn every_kind_of_output_is_written() {
-    let folder = Folder::new(&format!("{CAMERA}{VIRTUAL}"));
-    let output = folder.run(&[
-        "render",
-        "scene.toml",
-        "--rpp",
-        "4",
-        "--seed",
-        "7",
-        "--backend",
-        "cpu",
-        "--estimator",
-        "paper",
-        "--sampler",
-        "cmj",
-        "--composite",
-        "quotient",
-        "--max-bounces",
-        "2",
-        "--png-bits",
-        "16",
-        "--threads",
-        "1",
-        "--stats",
-        "s.json",
-        "-o",
-        "a.png",
-        "-o",
-        "b.exr",
-    ]);
+    let folder = Folder::with_scene(&format!("{CAMERA}{VIRTUAL}"));
+    let output = folder.run(
+        "render scene.toml --rpp 4 --seed 7 --backend cpu --estimator paper --sampler cmj --composite quotient --max-bounces 2 \
+         --png-bits 16 --threads 1 --stats s.json -o a.png -o b.exr",
+    );
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert_eq!(
         stderr(&output),
@@ -144,8 +55,7 @@ fn every_kind_of_output_is_written() {
     ] {
         assert!(names.iter().any(|n| n == name), "{names:?} lacks {name}");
     }
-    let stats: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(folder.path("s.json")).unwrap()).unwrap();
+    let stats = folder.json("s.json");
     assert_eq!(stats["backend"], "cpu");
     let pixels = &stats["pixels"];
     let total: u64 = ["background", "edge", "virtual", "skipped"]
@@ -163,22 +73,18 @@ fn every_kind_of_output_is_written() {
 /// Processor seconds are those of the look-ahead and the render, and grow with the rays.
 #[test]
 fn stats_tell_the_processors_seconds() {
-    let folder = Folder::new(&format!("{CAMERA}{VIRTUAL}"));
-    let seconds = |rpp: &str| {
-        let arguments = ["render", "scene.toml", "--backend", "cpu", "--rpp", rpp];
-        let output = command(folder.0.path(), &arguments)
-            .args(["-o", "a.png", "--stats", "s.json"])
-            .output()
-            .unwrap();
-        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        let text = std::fs::read_to_string(folder.path("s.json")).unwrap();
-        let stats: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let folder = Folder::with_scene(&format!("{CAMERA}{VIRTUAL}"));
+    let seconds = |rpp: u32| {
+        folder.succeed(&format!(
+            "render scene.toml --backend cpu --rpp {rpp} -o a.png --stats s.json"
+        ));
+        let stats = folder.json("s.json");
         ["cpu", "look_ahead", "render"].map(|name| stats["seconds"][name].as_f64().unwrap())
     };
-    let [few, look_ahead, _] = seconds("1");
+    let [few, look_ahead, _] = seconds(1);
     assert!(few > 0.0 && look_ahead > 0.0, "{few} {look_ahead}");
     // Some 4 million rays against 400.
-    let [many, look_ahead, render] = seconds("10000");
+    let [many, look_ahead, render] = seconds(10_000);
     assert!(many > 2.0 * few, "{many} {few}");
     assert!(
         look_ahead > 0.0 && look_ahead < render,
@@ -189,11 +95,11 @@ fn stats_tell_the_processors_seconds() {
 /// What is switched off in vain is said; what is not, is not.
 #[test]
 fn savings_that_a_render_has_not_are_told() {
-    let folder = Folder::new(&format!("{CAMERA}{VIRTUAL}"));
+    let folder = Folder::with_scene(&format!("{CAMERA}{VIRTUAL}"));
     let says = |flags: &str| {
-        let common = "render scene.toml --backend cpu --rpp 16 -o a.png";
-        let arguments: Vec<&str> = (common.split(' ')).chain(flags.split(' ')).collect();
-        let output = folder.run(&arguments);
+        let output = folder.run(&format!(
+            "render scene.toml --backend cpu --rpp 16 -o a.png {flags}"
+        ));
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         (stderr(&output), stdout(&output))
     };
@@ -226,47 +132,34 @@ fn savings_that_a_render_has_not_are_told() {
 
 #[test]
 fn unusable_scenes_are_one_line_and_exit_code_2() {
-    let folder = Folder::new(&format!("{CAMERA}vertical_fov = 3\n"));
-    assert_refused(&folder.run(&["render", "scene.toml"]), "scene.toml:7:1");
-    assert_refused(&folder.run(&["render", "absent.toml"]), "absent.toml");
-    let folder = Folder::new(&CAMERA.replace("photo.png", "absent.png"));
-    assert_refused(&folder.run(&["render", "scene.toml"]), "absent.png");
+    let folder = Folder::with_scene(&format!("{CAMERA}vertical_fov = 3\n"));
+    folder.refuse("render scene.toml", "scene.toml:7:1");
+    folder.refuse("render absent.toml", "absent.toml");
+    let folder = Folder::with_scene(&CAMERA.replace("photo.png", "absent.png"));
+    folder.refuse("render scene.toml", "absent.png");
 }
 
 /// The outputs are tried before the scene is even read: the scene here does not exist, and the message is about the output.
 #[test]
 fn unwritable_outputs_are_refused_before_any_work() {
-    let folder = Folder::new(CAMERA);
-    std::fs::create_dir(folder.path("folder.png")).unwrap();
+    let folder = Folder::with_scene(CAMERA);
+    folder.create("folder.png");
     for target in ["absent/a.png", "a.jpg", "folder.png"] {
-        assert_refused(
-            &folder.run(&["render", "absent.toml", "-o", target]),
-            target,
-        );
+        folder.refuse(&["render", "absent.toml", "-o", target], target);
     }
-    let output = folder.run(&[
-        "render",
-        "absent.toml",
-        "-o",
-        "a.png",
-        "--stats",
-        "absent/s.json",
-    ]);
-    assert_refused(&output, "absent/s.json");
+    let line = "render absent.toml -o a.png --stats absent/s.json";
+    folder.refuse(line, "absent/s.json");
     assert_eq!(folder.entries(), ["folder.png", "photo.png", "scene.toml"]);
-    assert_refused(
-        &folder.run(&["render", "absent.toml", "-o", "a.png"]),
-        "absent.toml",
-    );
+    folder.refuse("render absent.toml -o a.png", "absent.toml");
 }
 
 /// No output may replace a file that the scene is made of, however it is named.
 #[test]
 fn inputs_are_never_overwritten() {
-    let folder = Folder::new(&CAMERA.replace("photo.png", "sub/../photo.png"));
-    std::fs::create_dir(folder.path("sub")).unwrap();
-    let photo = std::fs::read(folder.path("photo.png")).unwrap();
-    let scene = std::fs::read(folder.path("scene.toml")).unwrap();
+    let folder = Folder::with_scene(&CAMERA.replace("photo.png", "sub/../photo.png"));
+    folder.create("sub");
+    let photo = folder.bytes("photo.png");
+    let scene = folder.bytes("scene.toml");
     let render = |arguments: &[&str]| {
         let common = ["render", "scene.toml", "--backend", "cpu"];
         folder.run(&[&common, arguments].concat())
@@ -279,22 +172,21 @@ fn inputs_are_never_overwritten() {
     {
         std::os::unix::fs::symlink("photo.png", folder.path("link.png")).unwrap();
         assert_refused(&render(&["-o", "link.png"]), made_of);
-        std::fs::remove_file(folder.path("link.png")).unwrap();
+        folder.remove("link.png");
     }
     // The default name is refused as well.
-    let name = folder.0.path().file_name().unwrap().to_string_lossy();
-    let default_name = format!("{name}.png");
+    let default_name = format!("{}.png", folder.name());
     std::fs::rename(folder.path("photo.png"), folder.path(&default_name)).unwrap();
     let text = CAMERA.replace("photo.png", &default_name);
-    std::fs::write(folder.path("scene.toml"), text).unwrap();
+    folder.write("scene.toml", text);
     assert_refused(&render(&[]), made_of);
     std::fs::rename(folder.path(&default_name), folder.path("photo.png")).unwrap();
-    std::fs::write(folder.path("scene.toml"), &scene).unwrap();
+    folder.write("scene.toml", &scene);
     assert_refused(
         &render(&["-o", "a.png", "-o", "sub/../a.png"]),
         "named for two outputs",
     );
-    assert_eq!(std::fs::read(folder.path("photo.png")).unwrap(), photo);
+    assert_eq!(folder.bytes("photo.png"), photo);
     assert_eq!(folder.entries(), ["photo.png", "scene.toml", "sub"]);
     // Negative control.
     let output = render(&["-o", "a.png"]);
@@ -304,9 +196,9 @@ fn inputs_are_never_overwritten() {
 /// The files beside a glTF file are inputs too.
 #[test]
 fn a_models_textures_are_never_overwritten() {
-    let folder = Folder::new(&format!("{CAMERA}[[virtual]]\nmesh = \"model.gltf\"\n"));
+    let folder = Folder::with_scene(&format!("{CAMERA}[[virtual]]\nmesh = \"model.gltf\"\n"));
     let model = r#"{ "asset": { "version": "2.0" }, "images": [{ "uri": "wood%20grain.png" }] }"#;
-    std::fs::write(folder.path("model.gltf"), model).unwrap();
+    folder.write("model.gltf", model);
     std::fs::copy(folder.path("photo.png"), folder.path("wood grain.png")).unwrap();
     let output = folder.run(&["render", "scene.toml", "-o", "wood grain.png"]);
     let message = stderr(&output);
@@ -316,48 +208,39 @@ fn a_models_textures_are_never_overwritten() {
 
 #[test]
 fn bad_usage_is_exit_code_2_and_help_is_0() {
-    let folder = Folder::new(CAMERA);
-    let bad: [&[&str]; 10] = [
-        &[],
-        &["rendre"],
-        &["render"],
-        &["render", "scene.toml", "--rpp", "0"],
-        &["render", "scene.toml", "--rpp", "-4"],
-        &["render", "scene.toml", "--sampler", "random"],
-        &["render", "scene.toml", "--png-bits", "12"],
-        &["render", "scene.toml", "--threads", "0"],
-        &["compare", "photo.png"],
-        &["compare", "photo.png", "photo.png", "--max-rmse", "NaN"],
-    ];
-    for arguments in bad {
-        let output = folder.run(arguments);
-        assert_eq!(
-            output.status.code(),
-            Some(2),
-            "{arguments:?}: {}",
-            stderr(&output)
-        );
-        assert!(!output.stderr.is_empty() && output.stdout.is_empty());
+    let folder = Folder::with_scene(CAMERA);
+    for line in [
+        "",
+        "rendre",
+        "render",
+        "render scene.toml --rpp 0",
+        "render scene.toml --rpp -4",
+        "render scene.toml --sampler random",
+        "render scene.toml --png-bits 12",
+        "render scene.toml --threads 0",
+        "compare photo.png",
+        "compare photo.png photo.png --max-rmse NaN",
+    ] {
+        let output = folder.run(line);
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{line}: {message}");
+        assert!(!message.is_empty() && output.stdout.is_empty());
     }
-    for arguments in [["--help"], ["--version"]] {
-        let output = folder.run(&arguments);
-        assert_eq!(output.status.code(), Some(0));
-        assert!(stdout(&output).contains("mixray"));
+    for line in ["--help", "--version"] {
+        assert!(folder.succeed(line).contains("mixray"));
     }
     assert_eq!(folder.entries(), ["photo.png", "scene.toml"]);
 }
 
 #[test]
 fn compare_prints_json_and_checks_a_limit() {
-    let folder = Folder::new(CAMERA);
-    let grey = |code: u8| image::RgbImage::from_pixel(8, 8, image::Rgb([code; 3]));
-    grey(100).save(folder.path("a.png")).unwrap();
-    grey(110).save(folder.path("b.png")).unwrap();
+    let folder = Folder::with_scene(CAMERA);
+    folder.save("a.png", 8, 8, |_, _| [100; 3]);
+    folder.save("b.png", 8, 8, |_, _| [110; 3]);
     let linear = |code: f64| ((code / 255.0 + 0.055) / 1.055).powf(2.4);
     let difference = linear(110.0) - linear(100.0);
-    let output = folder.run(&["compare", "a.png", "b.png"]);
-    assert_eq!(output.status.code(), Some(0));
-    let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let said = folder.succeed("compare a.png b.png");
+    let json: serde_json::Value = serde_json::from_str(&said).unwrap();
     let number = |key: &str| json[key].as_f64().unwrap();
     assert!((number("rmse") - difference).abs() < 1e-7);
     assert!((number("psnr") + 20.0 * difference.log10()).abs() < 1e-3);
@@ -366,37 +249,24 @@ fn compare_prints_json_and_checks_a_limit() {
     assert!(number("flip") > 0.0);
 
     let limit = |factor: f64| {
-        let limit = (difference * factor).to_string();
-        folder
-            .run(&["compare", "a.png", "b.png", "--max-rmse", &limit])
-            .status
-            .code()
+        let line = format!("compare a.png b.png --max-rmse {}", difference * factor);
+        folder.run(&line).status.code()
     };
     assert_eq!((limit(0.999), limit(1.001)), (Some(1), Some(0)));
-    assert_refused(
-        &folder.run(&["compare", "a.png", "photo.png"]),
-        "8 x 8 and 24 x 16",
-    );
-    assert_refused(
-        &folder.run(&["compare", "a.png", "absent.png"]),
-        "absent.png",
-    );
-    assert_refused(
-        &folder.run(&["compare", "a.png", "scene.toml"]),
-        "scene.toml",
-    );
+    folder.refuse("compare a.png photo.png", "8 x 8 and 24 x 16");
+    folder.refuse("compare a.png absent.png", "absent.png");
+    folder.refuse("compare a.png scene.toml", "scene.toml");
 }
 
 #[test]
 fn info_names_the_processor_and_every_adapter() {
-    let folder = Folder::new(CAMERA);
-    let text = folder.run(&["info"]);
-    assert_eq!(text.status.code(), Some(0));
-    assert!(stdout(&text).contains("threads"));
-    let json = folder.run(&["info", "--json"]);
-    let adapters: serde_json::Value = serde_json::from_str(&stdout(&json)).unwrap();
+    let folder = Folder::with_scene(CAMERA);
+    let text = folder.succeed("info");
+    assert!(text.contains("threads"));
+    let json = folder.succeed("info --json");
+    let adapters: serde_json::Value = serde_json::from_str(&json).unwrap();
     for adapter in adapters.as_array().unwrap() {
-        assert!(stdout(&text).contains(adapter["name"].as_str().unwrap()));
+        assert!(text.contains(adapter["name"].as_str().unwrap()));
     }
 }
 
@@ -405,45 +275,19 @@ fn info_names_the_processor_and_every_adapter() {
 #[test]
 fn ctrl_c_writes_the_picture_and_exits_with_130() {
     use std::os::unix::process::ExitStatusExt;
-    use std::time::{Duration, Instant};
 
-    let folder = Folder::new(&format!("{CAMERA}{VIRTUAL}"));
+    let folder = Folder::with_scene(&format!("{CAMERA}{VIRTUAL}"));
     // A signal before the render has begun just ends the program; then there has to be more patience.
     for wait_ms in [500, 2000, 8000] {
-        let mut child = command(
-            folder.0.path(),
-            &[
-                "render",
-                "scene.toml",
-                "--backend",
-                "cpu",
-                "--rpp",
-                "16777216",
-                "-o",
-                "a.png",
-            ],
-        )
-        .stdout(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-        std::thread::sleep(Duration::from_millis(wait_ms));
+        let mut child = folder
+            .command("render scene.toml --backend cpu --rpp 16777216 -o a.png")
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(wait_ms));
         assert_eq!(child.try_wait().unwrap(), None, "still rendering");
         assert!(!folder.path("a.png").exists());
-        let kill = Command::new("kill")
-            .args(["-INT", &child.id().to_string()])
-            .status();
-        assert!(kill.unwrap().success());
-        let start = Instant::now();
-        let status = loop {
-            if let Some(status) = child.try_wait().unwrap() {
-                break status;
-            }
-            if start.elapsed() > Duration::from_secs(30) {
-                child.kill().unwrap();
-                panic!("did not end");
-            }
-            std::thread::sleep(Duration::from_millis(20));
-        };
+        let status = interrupt(&mut child);
         if status.signal().is_some() {
             continue;
         }
@@ -460,11 +304,12 @@ fn ctrl_c_writes_the_picture_and_exits_with_130() {
 #[cfg(target_os = "linux")]
 #[test]
 fn the_gpu_is_refused_where_there_is_none() {
-    let folder = Folder::new(&format!("{CAMERA}{VIRTUAL}"));
+    let folder = Folder::with_scene(&format!("{CAMERA}{VIRTUAL}"));
     let without_driver = |backend: &str| {
-        let arguments = ["render", "scene.toml", "--rpp", "1", "--backend", backend];
-        command(folder.0.path(), &arguments)
-            .args(["-o", "a.png", "--stats", "s.json"])
+        folder
+            .command(&format!(
+                "render scene.toml --rpp 1 --backend {backend} -o a.png --stats s.json"
+            ))
             .env("VK_DRIVER_FILES", "/nonexistent")
             .env("VK_ICD_FILENAMES", "/nonexistent")
             .output()
@@ -475,8 +320,7 @@ fn the_gpu_is_refused_where_there_is_none() {
     // Negative control: `auto` takes the CPU instead.
     let output = without_driver("auto");
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let stats = std::fs::read_to_string(folder.path("s.json")).unwrap();
-    assert!(stats.contains("\"backend\": \"cpu\""), "{stats}");
+    assert_eq!(folder.json("s.json")["backend"], "cpu");
 }
 
 #[test]
@@ -484,31 +328,19 @@ fn both_backends_write_the_same_picture_of_the_room() {
     if mixray::gpu::harness::test_device().is_none() {
         return;
     }
-    let folder = Folder::new(CAMERA);
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/room/scene.toml");
+    let folder = Folder::with_scene(CAMERA);
+    let scene = root().join("scenes/room/scene.toml");
     let render = |backend: &str, seed: &str| {
         let name = format!("{backend}{seed}.png");
-        let arguments = [
-            "render",
-            scene,
-            "--rpp",
-            "1",
-            "--backend",
-            backend,
-            "--seed",
-            seed,
-        ];
-        let output = command(folder.0.path(), &arguments)
+        let status = folder
+            .command("render")
+            .arg(&scene)
+            .args(["--rpp", "1", "--backend", backend, "--seed", seed])
             .args(["-o", &name, "--stats", "s.json"])
-            .output()
-            .unwrap();
-        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        let stats = std::fs::read_to_string(folder.path("s.json")).unwrap();
-        assert!(
-            stats.contains(&format!("\"backend\": \"{backend}\"")),
-            "{stats}"
-        );
-        image::open(folder.path(&name)).unwrap().into_rgb8()
+            .status();
+        assert!(status.unwrap().success(), "{name}");
+        assert_eq!(folder.json("s.json")["backend"], backend);
+        folder.open(&name)
     };
     let expected = render("cpu", "0");
     // Share of the pixels that are more than a code apart.

@@ -6,39 +6,50 @@ mod cli;
 mod gltf;
 mod gltf_pictures;
 mod invariants;
+mod overwriting;
 mod references;
 mod scenes;
 mod sequence;
 mod smooth;
 mod stages;
 mod stress;
+mod support;
 mod twins_sampling;
 
-/// A file that no `mod` names would be left out without a word.
-#[test]
-fn every_file_is_a_module() {
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+use std::path::{Path, PathBuf};
+
+/// Files below a folder that no `mod` names: the compiler passes over them without a word.
+fn orphans(folder: &Path, parent: &str) -> Vec<PathBuf> {
+    let declarations = std::fs::read_to_string(folder.join(parent)).unwrap();
     let mut orphans = Vec::new();
-    let mut folders = vec![(root.clone(), "main.rs")];
-    while let Some((folder, parent)) = folders.pop() {
-        let declarations = std::fs::read_to_string(folder.join(parent)).unwrap();
-        let is_declared = |name: &str| {
-            let wanted = format!("mod {name};");
-            declarations.lines().any(|line| line.ends_with(&wanted))
-        };
-        for entry in std::fs::read_dir(&folder).unwrap() {
-            let path = entry.unwrap().path();
-            let stem = path.file_stem().unwrap().to_str().unwrap();
-            let is_folder = path.join("mod.rs").is_file();
-            let is_file = path.extension().is_some_and(|ending| ending == "rs")
-                && !["main", "mod"].contains(&stem);
-            if (is_folder || is_file) && !is_declared(stem) {
-                orphans.push(path.clone());
-            }
-            if is_folder {
-                folders.push((path, "mod.rs"));
-            }
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let stem = path.file_stem().unwrap().to_str().unwrap();
+        let is_folder = path.join("mod.rs").is_file();
+        let is_file = path.extension().is_some_and(|ending| ending == "rs")
+            && !["main", "mod"].contains(&stem);
+        if is_folder {
+            orphans.extend(self::orphans(&path, "mod.rs"));
+        }
+        let declaration = format!("mod {stem};");
+        if (is_folder || is_file) && !declarations.lines().any(|l| l.ends_with(&declaration)) {
+            orphans.push(path);
         }
     }
-    assert!(orphans.is_empty(), "no module: {orphans:?}");
+    orphans
+}
+
+#[test]
+fn every_file_is_a_module() {
+    let found = orphans(&support::root().join("tests"), "main.rs");
+    assert!(found.is_empty(), "no `mod` names {found:?}");
+    let folder = support::Folder::new();
+    folder.create("kinds");
+    folder.write("main.rs", "mod kinds;\nmod named;\n");
+    folder.write("named.rs", "");
+    folder.write("kinds/mod.rs", "pub mod named;\n");
+    folder.write("kinds/named.rs", "");
+    folder.write("kinds/stray.rs", "");
+    let control = [folder.path("kinds/stray.rs")];
+    assert_eq!(orphans(folder.root(), "main.rs"), control);
 }

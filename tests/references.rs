@@ -1,11 +1,12 @@
 //! Composites against converged references that an independent renderer, Mitsuba 3, made of the same scenes (docs/accuracy.md).
 
-use std::path::Path;
 use std::sync::Arc;
 
 use mixray::film::Picture;
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{BackendChoice, EncodedPhoto, LightKind, Material, Photo, Scene};
+
+use crate::support::{largest, root};
 
 /// Runs of a comparison: their spread is the standard error.
 const RUNS: u32 = 4;
@@ -76,10 +77,6 @@ impl Reference {
     }
 }
 
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
 fn grey(linear: &[[f32; 3]]) -> Vec<f64> {
     (linear.iter())
         .map(|c| c.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0)
@@ -132,9 +129,9 @@ fn render(scene: &Scene, backend: BackendChoice, rays_per_pixel: u32) -> Vec<Pic
             scene.settings.rays_per_pixel = rays_per_pixel;
             scene.settings.seed = seed;
             scene.settings.backend = backend;
-            let mut renderer =
-                Renderer::new(scene, RendererOptions::default()).expect("scene fits");
-            (renderer.advance(Budget::Complete, &|| false, &mut |_| ())).expect("renders");
+            let mut renderer = Renderer::new(scene, RendererOptions::default(), &Watcher::none())
+                .expect("scene fits");
+            (renderer.advance(Budget::Complete, &Watcher::none())).expect("renders");
             renderer.picture()
         })
         .collect()
@@ -206,7 +203,7 @@ fn compare(
         weighted_error: weighted.error / weighted.truth,
         weighted_standard_error: weighted.variance.sqrt() / weighted.truth,
         z_rms: (zs.iter().map(|z| z * z).sum::<f64>() / zs.len() as f64).sqrt(),
-        z_largest: zs.iter().fold(0.0, |a: f64, z| a.max(z.abs())),
+        z_largest: largest(zs.iter().copied()),
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{
     self, AntialiasSettings, BackendChoice, CartoonSettings, Exposure, NoiseFit, NoiseProfile,
     NoiseSettings, Overrides, Scene, Side,
@@ -33,10 +33,11 @@ fn render(scene: Scene) -> Renderer {
             all_planes: true,
             ..RendererOptions::default()
         },
+        &Watcher::none(),
     )
     .unwrap();
     renderer
-        .advance(Budget::Complete, &|| false, &mut |_| ())
+        .advance(Budget::Complete, &Watcher::none())
         .unwrap();
     renderer
 }

@@ -1,43 +1,15 @@
 //! Smoothing of scanned meshes, against surfaces whose truth is known and on the desk of the RGB-D photograph.
 
-use std::path::{Path, PathBuf};
-
 use glam::{DMat3, DVec3, Vec3};
 use mixray::scene::Primitive;
 use mixray::scene::gltf::load_gltf;
 use mixray::scene::smooth::{detect_scanner_noise, smooth};
 
-fn shared_data(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data")
-        .join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("SKIPPED: {} is not there", path.display());
-    None
-}
+use crate::support::{Random, shared_data};
 
 fn proxy(name: &str) -> Option<Primitive> {
     let scene = load_gltf(&shared_data(name)?.join("proxy.glb")).unwrap();
     Some((*scene.instances[0].primitive).clone())
-}
-
-/// Normal deviates: splitmix64 and the sum of twelve uniforms.
-struct Noise(u64);
-
-impl Noise {
-    fn uniform(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
-    }
-
-    fn normal(&mut self) -> f32 {
-        (0..12).map(|_| self.uniform()).sum::<f32>() - 6.0
-    }
 }
 
 const CELL: f32 = 0.008;
@@ -46,7 +18,7 @@ const SIDE: usize = 121;
 
 /// A grid of `SIDE` x `SIDE` vertices: `surface` of the grid coordinates (metres from the middle), with noise along +Y.
 fn grid(sigma: f32, surface: impl Fn(f32, f32) -> Vec3) -> (Primitive, Vec<Vec3>) {
-    let mut noise = Noise(7);
+    let mut noise = Random(7);
     let mut primitive = Primitive::default();
     let mut truth = Vec::new();
     let middle = (SIDE / 2) as f32;
@@ -57,7 +29,7 @@ fn grid(sigma: f32, surface: impl Fn(f32, f32) -> Vec3) -> (Primitive, Vec<Vec3>
                 (row as f32 - middle) * CELL,
             );
             truth.push(point);
-            let bump = Vec3::Y * (sigma * noise.normal());
+            let bump = Vec3::Y * (sigma * noise.normal() as f32);
             primitive.positions.push((point + bump).to_array());
             primitive.normals.push([0.0, 1.0, 0.0]);
         }
@@ -355,11 +327,11 @@ fn a_noisy_mug_keeps_its_radius() {
         let angle = x / radius * 0.25;
         Vec3::new(radius * angle.sin(), radius * angle.cos(), z * 0.25)
     });
-    let mut noise = Noise(3);
+    let mut noise = Random(3);
     let mut after = before.clone();
     for position in &mut after.positions {
         let [x, y, _] = *position;
-        let scale = 1.0 + 0.0005 * noise.normal() / x.hypot(y);
+        let scale = 1.0 + 0.0005 * noise.normal() as f32 / x.hypot(y);
         position[0] *= scale;
         position[1] *= scale;
     }

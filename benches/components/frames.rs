@@ -5,7 +5,7 @@ use std::path::Path;
 use criterion::{Criterion, SamplingMode};
 use mixray::bench::shrink;
 use mixray::film::Picture;
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{BackendChoice, Choice, Estimator, SamplerKind, load};
 
 use crate::processor_time::ProcessorTime;
@@ -37,16 +37,17 @@ fn renderer(name: &str, estimator: Estimator, sampler: SamplerKind) -> Renderer 
     scene.settings.backend = BackendChoice::Cpu;
     scene.settings.estimator = estimator;
     scene.settings.sampler = sampler;
-    Renderer::new(scene, RendererOptions::default()).expect("the CPU renders every scene")
+    Renderer::new(scene, RendererOptions::default(), &Watcher::none())
+        .expect("the CPU renders every scene")
 }
 
 /// Pilot, samples, real rays of edge pixels, composite.
 fn frame(renderer: &mut Renderer) -> Picture {
     renderer
-        .set_samples(RAYS_PER_PIXEL, 1)
+        .set_samples(RAYS_PER_PIXEL, 1, &Watcher::none())
         .expect("a number of rays in range");
     renderer
-        .advance(Budget::Complete, &|| false, &mut |_| ())
+        .advance(Budget::Complete, &Watcher::none())
         .expect("the CPU renders every scene");
     renderer.picture()
 }

@@ -2,7 +2,7 @@
 
 use image::{Rgb, RgbImage};
 use mixray::film::Picture;
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::srgb::encode;
 use mixray::scene::{self, CartoonSettings, NoiseFit, NoiseProfile};
 use mixray::stages::cartoon::cartoon;
@@ -49,8 +49,12 @@ pub fn soft_edge() -> Result<()> {
                  material = {{ base_color = [0.4, 0.4, 0.4], specular = 0.0 }}\n[render]\nrays_per_pixel = {rays}\n[noise]\nprofile = \"noise.toml\"\n"
             ),
         )?;
-        let mut renderer = Renderer::new(scene::load(&path)?, RendererOptions::default())?;
-        renderer.advance(Budget::Complete, &|| false, &mut |_| ())?;
+        let mut renderer = Renderer::new(
+            scene::load(&path)?,
+            RendererOptions::default(),
+            &Watcher::none(),
+        )?;
+        renderer.advance(Budget::Complete, &Watcher::none())?;
         let plain = renderer.picture();
         let finished = finish(
             plain.clone(),

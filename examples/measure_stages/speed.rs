@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use mixray::gpu::{AdapterChoice, GpuDevice};
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{self, CartoonSettings, NoiseFit, NoiseProfile, NoiseSettings, Photo};
 use mixray::stages::cartoon::cartoon as stylise;
 use mixray::stages::{EncodedImage, GpuStages, finish};
@@ -111,8 +111,8 @@ pub fn cartoon() -> Result<()> {
 pub fn noise() -> Result<()> {
     let mut scene = scene::load(&demo("scene.toml"))?;
     scene.settings.rays_per_pixel = 49;
-    let mut renderer = Renderer::new(scene, RendererOptions::default())?;
-    renderer.advance(Budget::Complete, &|| false, &mut |_| ())?;
+    let mut renderer = Renderer::new(scene, RendererOptions::default(), &Watcher::none())?;
+    renderer.advance(Budget::Complete, &Watcher::none())?;
     let frame_ms = 1000.0 * renderer.seconds().render;
     let picture = renderer.picture();
     let profile = NoiseProfile::from_fit(NoiseFit { a: 0.02, b: 2.0 }, 4);

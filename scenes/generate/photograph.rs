@@ -6,7 +6,7 @@ use std::path::Path;
 
 use mixray::math::{hash_combine, uniform_from_bits};
 use mixray::output::{PngBits, Target, write_png};
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Progress, Renderer, RendererOptions, Watcher};
 use mixray::scene::{self, BackendChoice, Overrides, Scene, Side};
 
 /// Noise of a camera, in linear photograph values where white is 1.
@@ -72,15 +72,16 @@ pub fn photograph(
         backend: Some(BackendChoice::Cpu),
         ..Overrides::default()
     });
-    let mut renderer = Renderer::new(scene, RendererOptions::default())?;
-    renderer.advance(Budget::Complete, &|| false, &mut |progress| {
+    let mut renderer = Renderer::new(scene, RendererOptions::default(), &Watcher::none())?;
+    let say = |progress: &Progress| {
+        let percent = 100.0 * progress.share_done;
         eprintln!(
-            "{}: {} of {} rays per pixel",
+            "{}: {} {percent:.0}%",
             path.display(),
-            progress.samples,
-            progress.samples_total
+            progress.phase.name()
         );
-    })?;
+    };
+    renderer.advance(Budget::Complete, &Watcher::none().heard_by(&say))?;
     let mut picture = renderer.picture();
     for (index, value) in picture.linear.as_flattened_mut().iter_mut().enumerate() {
         let signal = f64::from(*value).max(0.0);

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::Machine;
 use super::columns::aligned;
 use crate::gpu::KernelSeconds;
-use crate::renderer::{Budget, RenderError, Renderer, RendererOptions};
+use crate::renderer::{Budget, RenderError, Renderer, RendererOptions, Watcher};
 use crate::scene::{BackendChoice, Scene};
 
 /// One render of a scene, shaders compiled before. Seconds.
@@ -51,15 +51,14 @@ pub fn gpu_time(scene: &Scene, rays_per_pixel: u32) -> Result<Option<GpuTime>, R
     scene.settings.rays_per_pixel = rays_per_pixel;
     let seed = scene.settings.seed;
     let (name, width, height) = (scene.name.clone(), scene.camera.width, scene.camera.height);
-    let mut renderer = Renderer::new(scene, RendererOptions::default())?;
-    let complete =
-        |renderer: &mut Renderer| renderer.advance(Budget::Complete, &|| false, &mut |_| ());
+    let mut renderer = Renderer::new(scene, RendererOptions::default(), &Watcher::none())?;
+    let complete = |renderer: &mut Renderer| renderer.advance(Budget::Complete, &Watcher::none());
     complete(&mut renderer)?;
     if !renderer.profile_gpu() {
         return Ok(None);
     }
     let start = Instant::now();
-    renderer.set_samples(rays_per_pixel, seed.wrapping_add(1))?;
+    renderer.set_samples(rays_per_pixel, seed.wrapping_add(1), &Watcher::none())?;
     let setup_secs = start.elapsed().as_secs_f64();
     complete(&mut renderer)?;
     let composite = Instant::now();

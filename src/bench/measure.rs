@@ -2,12 +2,12 @@
 
 use std::time::Instant;
 
-use cpu_time::ProcessTime;
+use crate::clock::ProcessorTime;
 
 use super::{Errors, Method, Row, Run, Truth};
 use crate::film::Picture;
 use crate::packed::PackError;
-use crate::renderer::{Budget, RayTotals, RenderError, Renderer, RendererOptions, StatsRays};
+use crate::renderer::{Budget, RayCounts, RenderError, Renderer, RendererOptions, Watcher};
 use crate::scene::{BackendChoice, Scene};
 
 /// What to measure on a scene.
@@ -184,7 +184,7 @@ pub(super) struct Sample {
     pub wall_secs: f64,
     setup_secs: f64,
     pub cpu_secs: f64,
-    pub rays: RayTotals,
+    pub rays: RayCounts,
     skipped_fraction: f64,
     non_finite: u64,
     errors: Errors,
@@ -214,7 +214,7 @@ impl Subject {
             filter: method.filter,
             ..RendererOptions::default()
         };
-        let renderer = Renderer::new(scene, options)?;
+        let renderer = Renderer::new(scene, options, &Watcher::none())?;
         let seconds = renderer.seconds();
         Ok(Self {
             method,
@@ -254,28 +254,28 @@ impl Subject {
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<(Sample, Picture), RenderError> {
         let before = self.renderer.rays();
-        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        let (wall, cpu) = (Instant::now(), ProcessorTime::now());
         let samples = rays_per_pixel.unwrap_or(self.rays_per_pixel);
-        self.renderer.set_samples(samples, seed)?;
+        self.renderer.set_samples(samples, seed, &Watcher::none())?;
         let setup_secs = wall.elapsed().as_secs_f64();
         let goal = self.method.goal.filter(|_| rays_per_pixel.is_none());
         match goal {
             Some(goal) => self
                 .renderer
-                .render_to_error(&goal.into(), cancelled, &mut |_| ())?,
+                .render_to_error(&goal.into(), &Watcher::none().cancelled_by(cancelled))?,
             None => self
                 .renderer
-                .advance(Budget::Complete, cancelled, &mut |_| ())?,
+                .advance(Budget::Complete, &Watcher::none().cancelled_by(cancelled))?,
         }
         let picture = self.renderer.picture();
-        let (wall_secs, cpu_secs) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        let (wall_secs, cpu_secs) = (wall.elapsed().as_secs_f64(), cpu.elapsed_secs());
         let film = self.renderer.film();
         let sample = Sample {
             seed,
             wall_secs,
             setup_secs,
             cpu_secs,
-            rays: since(self.renderer.rays(), before),
+            rays: self.renderer.rays() - before,
             skipped_fraction: film.counts().skipped as f64 / film.pixels.len().max(1) as f64,
             non_finite: film.non_finite_samples(),
             errors: Errors::default(),
@@ -335,30 +335,9 @@ impl Subject {
     }
 }
 
-fn since(now: RayTotals, before: RayTotals) -> RayTotals {
-    RayTotals {
-        primary: now.primary - before.primary,
-        mixed: now.mixed - before.mixed,
-        real: now.real - before.real,
-        mixed_shadow: now.mixed_shadow - before.mixed_shadow,
-        real_shadow: now.real_shadow - before.real_shadow,
-    }
-}
-
-fn mean_rays(samples: &[Sample]) -> StatsRays {
-    let mut sum = RayTotals::default();
-    for sample in samples {
-        sum += sample.rays;
-    }
-    let mean = |total: u64| total / samples.len().max(1) as u64;
-    RayTotals {
-        primary: mean(sum.primary),
-        mixed: mean(sum.mixed),
-        real: mean(sum.real),
-        mixed_shadow: mean(sum.mixed_shadow),
-        real_shadow: mean(sum.real_shadow),
-    }
-    .into()
+fn mean_rays(samples: &[Sample]) -> RayCounts {
+    let sum: RayCounts = samples.iter().map(|sample| sample.rays).sum();
+    sum.map(|total| total / samples.len().max(1) as u64)
 }
 
 fn mean(values: &[f64]) -> f64 {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::{Errors, Goal, Machine, Reach};
-use crate::renderer::{Skip, StatsRays};
+use crate::renderer::{RayCounts, Skip};
 use crate::scene::{BackendChoice, Composite, Estimator, SamplerKind};
 
 /// Version of the JSON; a file of another version is not compared.
@@ -129,7 +129,7 @@ pub struct Row {
     pub cpu_secs: f64,
     pub cpu_secs_sd: f64,
     /// Mean over the runs.
-    pub rays: StatsRays,
+    pub rays: RayCounts,
     /// All rays over wall seconds.
     pub mrays_per_sec: f64,
     /// Of the pixels: out of everything virtual's reach, so that no ray was traced for them.
@@ -268,7 +268,7 @@ pub(super) mod test_support {
             setup_secs: 0.001,
             cpu_secs: secs,
             cpu_secs_sd: 0.002,
-            rays: StatsRays {
+            rays: RayCounts {
                 primary: 48,
                 mixed: 60,
                 real: 5,

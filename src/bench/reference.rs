@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::{ReferenceNote, Truth};
+use crate::files;
 use crate::film::Picture;
-use crate::output::{ChannelFile, OutputError, Target, write_reference};
-use crate::renderer::{Budget, RenderError, Renderer, RendererOptions};
+use crate::output::{ChannelFile, Format, OutputError, Target, write_reference};
+use crate::renderer::{Budget, RenderError, Renderer, RendererOptions, Watcher};
 use crate::scene::{Choice, Composite, Estimator, Photo, SamplerKind, Scene};
 
 /// Independent scrambles from which the standard error is taken, at least.
@@ -80,6 +81,8 @@ pub fn reference(
         Source::Given(path) => given(scene, path, cancelled),
         Source::Folder(folder) => {
             let path = folder.join(file_name(&scene));
+            // Kept from run to run, and made anew if it is not good enough.
+            files::own(&path).map_err(OutputError::from)?;
             if let Some(kept) = kept(&scene, &path, goal) {
                 return Ok(Some(kept));
             }
@@ -141,7 +144,7 @@ fn keep(
         (RAYS, note.rays_per_pixel.to_string()),
         (SCRAMBLES_MADE, note.scrambles.to_string()),
     ];
-    let target = Target::picture(path)?;
+    let target = Target::named(path, Format::Exr);
     write_reference(
         &target,
         &truth.picture,
@@ -216,8 +219,9 @@ fn given(
             })?;
             check(photo.width, photo.height)?;
             scene.settings.rays_per_pixel = MASK_RAYS;
-            let mut renderer = Renderer::new(scene.clone(), RendererOptions::default())?;
-            renderer.advance(Budget::Complete, cancelled, &mut |_| ())?;
+            let mut renderer =
+                Renderer::new(scene.clone(), RendererOptions::default(), &Watcher::none())?;
+            renderer.advance(Budget::Complete, &Watcher::none().cancelled_by(cancelled))?;
             if cancelled() {
                 return Ok(None);
             }
@@ -257,7 +261,7 @@ fn make(
     let mut rays = TRIAL_RAYS.min(longest);
     let mut first = scene.clone();
     first.settings.rays_per_pixel = rays;
-    let mut renderer = Renderer::new(first, RendererOptions::default())?;
+    let mut renderer = Renderer::new(first, RendererOptions::default(), &Watcher::none())?;
     let mut seed = FIRST_SEED;
     let mut mean = MeanPicture::new(scene);
     let is_trial_enough =
@@ -333,9 +337,9 @@ impl MeanPicture {
             self.scrambles + 1,
             self.standard_error()
         ));
-        renderer.set_samples(rays, *seed)?;
+        renderer.set_samples(rays, *seed, &Watcher::none())?;
         *seed = seed.wrapping_add(1);
-        renderer.advance(Budget::Complete, cancelled, &mut |_| ())?;
+        renderer.advance(Budget::Complete, &Watcher::none().cancelled_by(cancelled))?;
         if cancelled() {
             return Ok(false);
         }

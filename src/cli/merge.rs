@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::progress::Bar;
 use super::render::write;
 use super::values::png_bits;
 use super::{Failure, Outcome, print, say};
 use crate::film::Film;
-use crate::output::{FilmNote, PngBits, Target, check_distinct, read_film};
-use crate::renderer::Renderer;
+use crate::output::{FilmNote, PngBits, Target, read_film};
+use crate::renderer::{Progress, Renderer, Watcher};
 use crate::scene::{self, BackendChoice, Scene};
 
 /// Puts films of sample ranges together
@@ -59,14 +60,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         return Err(Failure("there is nothing to merge".to_owned()));
     };
     let scene = load(&first, arguments.scene.as_deref())?;
-    let outputs: Vec<&Path> = arguments.output.iter().map(PathBuf::as_path).collect();
-    let inputs: Vec<PathBuf> = scene
-        .inputs
-        .iter()
-        .chain(&arguments.parts)
-        .cloned()
-        .collect();
-    check_distinct(&outputs, &inputs)?;
     let (mut film, mut range) = (first.film, first.note.range);
     for part in parts {
         film.merge(&part.film)
@@ -74,7 +67,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         range.1 = part.note.range.1;
     }
     let total = first.note.total;
-    let renderer = Renderer::with_film(scene, film, range.1, first.note.without)?;
+    let bar = Bar::new("building trees", "rays per pixel");
+    let hear = |progress: &Progress| bar.hear(progress);
+    let renderer = Renderer::with_film(
+        scene,
+        film,
+        range.1,
+        first.note.without,
+        &Watcher::none().heard_by(&hear),
+    )?;
+    drop(bar);
     let complete = range == (0, total);
     write(
         &renderer,

@@ -3,43 +3,65 @@
 use std::io::IsTerminal;
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
-use crate::renderer::Progress;
+use super::pool;
+use super::terminal::escaped;
+use crate::renderer::{Phase, Progress};
 
-/// What a render counts: "rays per pixel" or "scrambles".
+/// What a render does, and the share of it that is done.
 pub(super) struct Bar {
     bar: Option<ProgressBar>,
     unit: &'static str,
 }
 
+/// Of the bar's length.
+const PARTS: u64 = 1000;
+
 impl Bar {
-    pub(super) fn new(total: u32, unit: &'static str) -> Self {
+    /// `unit`: of what a render counts, "rays per pixel" or "scrambles".
+    pub(super) fn new(doing: &'static str, unit: &'static str) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::new(u64::from(total));
-            set_template(&bar, &format!("{{wide_bar}} {{pos}}/{{len}} {unit}"));
-            bar.enable_steady_tick(Duration::from_millis(200));
+            let bar = ProgressBar::new(PARTS);
+            set_template(&bar, "{prefix} {wide_bar} {percent:>3}%{msg}");
+            bar.set_prefix(doing);
+            tick(&bar, 200);
             bar
         });
         Self { bar, unit }
     }
 
-    pub(super) fn show(&self, progress: &Progress) {
-        if let Some(bar) = &self.bar {
-            let unit = self.unit;
-            set_template(
-                bar,
-                &format!("{{wide_bar}} {{pos}}/{{len}} {unit}, {{msg}} Mrays/s, {{eta}} left"),
-            );
-            bar.set_length(u64::from(progress.samples_total));
-            bar.set_position(u64::from(progress.samples));
-            let seconds = progress.elapsed.as_secs_f64().max(1e-9);
+    pub(super) fn hear(&self, progress: &Progress) {
+        let Some(bar) = &self.bar else { return };
+        bar.set_prefix(progress.phase.name());
+        bar.set_position((progress.share_done * PARTS as f64) as u64);
+        let seconds = progress.elapsed.as_secs_f64().max(1e-9);
+        let left = seconds * (1.0 / progress.share_done.max(1e-9) - 1.0);
+        let mut message = String::new();
+        if progress.phase == Phase::Rendering {
+            let (samples, total, unit) = (progress.samples, progress.samples_total, self.unit);
             let rate = progress.rays.traced() as f64 / seconds / 1e6;
-            bar.set_message(format!("{rate:.2}"));
+            message = format!(", {samples}/{total} {unit}, {rate:.2} Mrays/s");
         }
+        if progress.share_done > 0.0 && seconds > 1.0 {
+            let left = HumanDuration(Duration::try_from_secs_f64(left).unwrap_or(Duration::MAX));
+            message += &format!(", {left:#} left");
+        }
+        bar.set_message(message);
     }
 
-    pub(super) fn clear(&self) {
+    /// Says something while the bar steps aside.
+    pub(super) fn aside(&self, speak: impl FnOnce()) {
+        match &self.bar {
+            Some(bar) => bar.suspend(speak),
+            None => speak(),
+        }
+    }
+}
+
+/// However the command ends, no bar stays behind.
+impl Drop for Bar {
+    fn drop(&mut self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
@@ -56,14 +78,14 @@ impl Steps {
         }
         let bar = ProgressBar::new(count);
         set_template(&bar, "{bar:24} {pos}/{len}, {elapsed}: {wide_msg}");
-        bar.enable_steady_tick(Duration::from_millis(500));
+        tick(&bar, 500);
         Self(Some(bar))
     }
 
     /// Something within a step.
     pub(super) fn say(&self, message: &str) {
         if let Some(bar) = &self.0 {
-            bar.set_message(message.to_owned());
+            bar.set_message(escaped(message));
         }
     }
 
@@ -78,6 +100,13 @@ impl Steps {
         if let Some(bar) = &self.0 {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// Moves on its own, where a thread can be made for that.
+fn tick(bar: &ProgressBar, milliseconds: u64) {
+    if pool::can_spawn() {
+        bar.enable_steady_tick(Duration::from_millis(milliseconds));
     }
 }
 

@@ -1,19 +1,20 @@
 //! `mixray render`: a scene file to pictures.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
 
 use super::picture_flags::PictureFlags;
+use super::progress::Bar;
 use super::values::{above_zero, camera_noise, whole_range};
-use super::{Failure, Outcome, interrupt, print, progress, say, summary};
+use super::{Failure, Outcome, interrupt, print, say, summary};
 use crate::output::{
-    FilmNote, Format, Metadata, PngBits, Target, check_distinct, check_writable, write_exr,
-    write_film, write_png, write_text,
+    FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr, write_film, write_png,
+    write_text,
 };
 use crate::renderer::{
-    Budget, CameraNoise, ErrorGoal, Renderer, RendererOptions, SCRAMBLES, Stats,
+    Budget, CameraNoise, ErrorGoal, Progress, Renderer, RendererOptions, SCRAMBLES, Stats, Watcher,
 };
 use crate::scene::{self, MotionBlurMethod, Overrides};
 use crate::stages::{GpuStages, finish};
@@ -126,6 +127,11 @@ impl Arguments {
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     job.flags.start_threads()?;
     let start = Instant::now();
+    let unit = match job.goal {
+        Some(_) => "scrambles",
+        None => "rays per pixel",
+    };
+    let bar = Bar::new("reading the scene", unit);
     let mut scene = scene::load(&job.scene)?;
     scene.settings.apply(&job.overrides);
     let mut goal = job.goal;
@@ -140,9 +146,11 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
             fit: noise.profile.fit,
         });
     }
-    for warning in &scene.warnings {
-        say("warning", warning);
-    }
+    bar.aside(|| {
+        for warning in &scene.warnings {
+            say("warning", warning);
+        }
+    });
     let targets = match job.targets.as_slice() {
         [] => vec![Target::picture(&PathBuf::from(format!(
             "{}.png",
@@ -150,10 +158,6 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         )))?],
         given => given.to_vec(),
     };
-    let outputs: Vec<&Path> = (targets.iter().map(Target::path))
-        .chain(job.flags.stats.as_deref())
-        .collect();
-    check_distinct(&outputs, &scene.inputs)?;
     let load_secs = start.elapsed().as_secs_f64();
 
     let options = RendererOptions {
@@ -162,25 +166,20 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         without: job.flags.without(),
         filter: job.filter,
     };
-    let mut renderer = Renderer::new(scene, options)?;
+    let hear = |progress: &Progress| bar.hear(progress);
+    let watcher = Watcher::none().heard_by(&hear);
+    let mut renderer = Renderer::new(scene, options, &watcher)?;
     let without = renderer.without();
-    say_idle(&renderer, goal.as_ref());
+    bar.aside(|| say_idle(&renderer, goal.as_ref()));
     let goal = goal.map(|goal| goal.without(without));
     let interrupted = interrupt::watch()?;
-    let (first, end) = (job.range).unwrap_or((0, renderer.scene().settings.rays_per_pixel));
-    let unit = if goal.is_some() {
-        "scrambles"
-    } else {
-        "rays per pixel"
-    };
-    let bar = progress::Bar::new(end - first, unit);
     let cancelled = || interrupted.is_set();
-    let result = match &goal {
-        Some(goal) => renderer.render_to_error(goal, &cancelled, &mut |p| bar.show(&p)),
-        None => renderer.advance(Budget::Complete, &cancelled, &mut |p| bar.show(&p)),
-    };
-    bar.clear();
-    result?;
+    let watcher = watcher.cancelled_by(&cancelled);
+    match &goal {
+        Some(goal) => renderer.render_to_error(goal, &watcher)?,
+        None => renderer.advance(Budget::Complete, &watcher)?,
+    }
+    drop(bar);
     for note in renderer.notes() {
         say("note", note);
     }

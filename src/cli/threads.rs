@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::Failure;
+use super::{Failure, pool};
 
 #[derive(Debug, Args)]
 pub(super) struct ThreadsFlag {
@@ -14,11 +14,6 @@ pub(super) struct ThreadsFlag {
 impl ThreadsFlag {
     /// Once, before anything runs on several threads.
     pub(super) fn start(&self) -> Result<(), Failure> {
-        if let Some(threads) = self.threads {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(usize::from(threads))
-                .build_global()?;
-        }
-        Ok(())
+        pool::start(self.threads)
     }
 }

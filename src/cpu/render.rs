@@ -1,113 +1,110 @@
 //! Runs the estimator over the pixels of a film, on all threads of the current rayon pool.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::contribution::ESTIMATOR_PAPER;
 use super::estimator::{advance, begin_sample, samples_without_turn};
 use super::request::answer;
-use super::state::{PathState, RayCounts, STAGE_DONE};
+use super::state::{PathState, STAGE_DONE};
 use crate::film::{Film, Guide, GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
-use crate::packed::{PIXEL_EDGE, PIXEL_OUT_OF_REACH, PackedScene};
-use crate::renderer::{Cancel, Pass, RayTotals};
+use crate::packed::PackedScene;
+use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
 
 /// Pixels a task renders before it looks for cancellation.
 const TILE_PIXELS: usize = 512;
 
-/// Renders a pass into the film. A cancelled pass leaves whole pixels only: each has taken all of the pass's samples or none.
-pub fn render_pass(scene: &PackedScene, film: &mut Film, pass: Pass, cancel: &Cancel) -> RayTotals {
-    let totals = AtomicTotals::default();
-    let first_ray = film.first_sample;
-    let selected: Vec<bool> = match pass {
-        Pass::Main { .. } | Pass::MainRows { .. } => Vec::new(),
-        Pass::Real { everywhere } | Pass::RealRows { everywhere, .. } => (0..film.pixels.len())
-            .map(|i| {
-                let known_edge = scene.pixels[i].flags & PIXEL_EDGE != 0;
-                known_edge || film.needs_real(i) || (everywhere && wants_real(&film.pixels[i]))
-            })
-            .collect(),
-    };
-    let mut no_guides: Vec<GuideSums> = Vec::new();
-    let with_guides = !film.guides.is_empty();
-    if !with_guides {
-        no_guides.resize(
-            film.pixels.len().div_ceil(TILE_PIXELS),
-            GuideSums::default(),
-        );
-    }
-    let guides: &mut [GuideSums] = if with_guides {
-        &mut film.guides
-    } else {
-        &mut no_guides
-    };
-    let guide_chunk = if with_guides { TILE_PIXELS } else { 1 };
-    film.pixels
-        .par_chunks_mut(TILE_PIXELS)
-        .zip(guides.par_chunks_mut(guide_chunk))
-        .enumerate()
-        .for_each(|(tile, (sums, guides))| {
-            if cancel.is_cancelled() {
-                return;
+/// Takes the samples of `work` and adds them to the film; the rays traced. A cancelled render leaves whole pixels only: each has taken all of
+/// its samples or none.
+pub fn render(
+    scene: &PackedScene,
+    film: &mut Film,
+    work: &WorkList,
+    watcher: &Watcher<'_>,
+) -> RayCounts {
+    tiles(film, &work.pixels)
+        .into_par_iter()
+        .map(|mut tile| {
+            let mut rays = RayCounts::default();
+            if watcher.is_cancelled() {
+                return rays;
             }
-            let mut counts = RayCounts64::default();
-            for (i, sums) in sums.iter_mut().enumerate() {
-                let pixel = tile * TILE_PIXELS + i;
-                let factor = scene.pixels[pixel].sample_factor;
-                let first_sample = first_ray * factor;
-                let row = pixel / scene.frame.width as usize;
-                let end = pass.end_of_row(row).saturating_mul(factor);
-                match pass {
-                    Pass::Main { .. } | Pass::MainRows { .. } => {
-                        if scene.pixels[pixel].flags & PIXEL_OUT_OF_REACH != 0 {
-                            continue;
-                        }
-                        while first_sample + sums.n < end {
-                            let index = first_sample + sums.n;
-                            let idle = samples_without_turn(scene, pixel as u32, index, end);
-                            if idle > 0 {
-                                sums.add_nothing(idle);
-                                continue;
-                            }
-                            let guide = if with_guides {
-                                Some(&mut guides[i])
-                            } else {
-                                None
-                            };
-                            main_sample(scene, pixel as u32, index, sums, guide, &mut counts);
-                        }
-                    }
-                    Pass::Real { .. } | Pass::RealRows { .. } => {
-                        if !selected[pixel] {
-                            continue;
-                        }
-                        while sums.n_real < sums.n && first_sample + sums.n_real < end {
-                            let index = first_sample + sums.n_real;
-                            let st = run(
-                                scene,
-                                begin_sample(scene, pixel as u32, index, true),
-                                &mut counts,
-                            );
-                            pixel_add_real(
-                                sums,
-                                index,
-                                st.mask != 0,
-                                st.radiance * scene.frame.exposure_scale,
-                            );
-                        }
-                    }
+            for pixel in tile.work {
+                match work.pass {
+                    Pass::Main => tile.main_samples(scene, pixel, &mut rays),
+                    Pass::Real => tile.real_samples(scene, pixel, &mut rays),
                 }
             }
-            totals.add(&counts);
-            cancel.progress(sums.len() as u64);
-        });
-    totals.get()
+            let samples = tile.work.iter().map(|pixel| u64::from(pixel.samples()));
+            watcher.taken(samples.sum());
+            rays
+        })
+        .sum()
 }
 
-/// The quotient composite and the real plane want Ir wherever something real may be seen.
-fn wants_real(sums: &PixelSums) -> bool {
-    sums.m < sums.n && sums.n_real < sums.n
+/// Neighbouring pixels of a film, with their work.
+struct Tile<'a> {
+    first_pixel: usize,
+    sums: &'a mut [PixelSums],
+    /// Empty where the film has none.
+    guides: &'a mut [GuideSums],
+    work: &'a [PixelWork],
+}
+
+/// The tiles that have work.
+fn tiles<'a>(film: &'a mut Film, mut work: &'a [PixelWork]) -> Vec<Tile<'a>> {
+    let mut tiles = Vec::new();
+    let mut guides = film.guides.chunks_mut(TILE_PIXELS);
+    for (tile, sums) in film.pixels.chunks_mut(TILE_PIXELS).enumerate() {
+        let first_pixel = tile * TILE_PIXELS;
+        let end = first_pixel + sums.len();
+        let guides = guides.next().unwrap_or_default();
+        let (now, later) = work.split_at(work.partition_point(|w| (w.pixel as usize) < end));
+        work = later;
+        if !now.is_empty() {
+            tiles.push(Tile {
+                first_pixel,
+                sums,
+                guides,
+                work: now,
+            });
+        }
+    }
+    tiles
+}
+
+impl Tile<'_> {
+    fn main_samples(&mut self, scene: &PackedScene, work: &PixelWork, rays: &mut RayCounts) {
+        let at = work.pixel as usize - self.first_pixel;
+        let sums = &mut self.sums[at];
+        let mut index = work.first;
+        while index < work.end {
+            let idle = samples_without_turn(scene, work.pixel, index, work.end);
+            if idle > 0 {
+                sums.add_nothing(idle);
+                index += idle;
+                continue;
+            }
+            main_sample(
+                scene,
+                work.pixel,
+                index,
+                sums,
+                self.guides.get_mut(at),
+                rays,
+            );
+            index += 1;
+        }
+    }
+
+    fn real_samples(&mut self, scene: &PackedScene, work: &PixelWork, rays: &mut RayCounts) {
+        let sums = &mut self.sums[work.pixel as usize - self.first_pixel];
+        for index in work.first..work.end {
+            let st = run(scene, begin_sample(scene, work.pixel, index, true), rays);
+            let real = st.result.radiance * scene.frame.exposure_scale;
+            pixel_add_real(sums, index, st.result.mask != 0, real);
+        }
+    }
 }
 
 fn main_sample(
@@ -116,23 +113,23 @@ fn main_sample(
     index: u32,
     sums: &mut PixelSums,
     guide: Option<&mut GuideSums>,
-    counts: &mut RayCounts64,
+    rays: &mut RayCounts,
 ) {
-    let st = run(scene, begin_sample(scene, pixel, index, false), counts);
+    let st = run(scene, begin_sample(scene, pixel, index, false), rays);
     let scale = scene.frame.exposure_scale;
-    let is_virtual = st.mask != 0;
+    let is_virtual = st.result.mask != 0;
     let (contribution, real) = if scene.frame.estimator == ESTIMATOR_PAPER {
         let real = st.radiance_real * scale;
         (
             if is_virtual {
-                st.radiance * scale
+                st.result.radiance * scale
             } else {
-                (st.radiance - st.radiance_real) * scale
+                (st.result.radiance - st.radiance_real) * scale
             },
             Some(real),
         )
     } else {
-        (st.radiance * scale, None)
+        (st.result.radiance * scale, None)
     };
     sums.add(
         index,
@@ -144,23 +141,23 @@ fn main_sample(
         },
     );
     if let Some(sums) = guide
-        && st.depth_m.is_finite()
+        && st.first_hit.depth_m.is_finite()
     {
         let guide = Guide {
-            depth_m: st.depth_m,
-            normal: st.normal,
-            albedo: st.albedo,
+            depth_m: st.first_hit.depth_m,
+            normal: st.first_hit.normal,
+            albedo: st.first_hit.albedo,
         };
         guide_add(sums, guide.depth_m, guide.normal, guide.albedo);
     }
 }
 
-fn run(scene: &PackedScene, mut st: PathState, counts: &mut RayCounts64) -> PathState {
-    while st.stage != STAGE_DONE {
+fn run(scene: &PackedScene, mut st: PathState, rays: &mut RayCounts) -> PathState {
+    while st.path.stage != STAGE_DONE {
         answer(scene, &mut st);
         advance(scene, &mut st);
     }
-    counts.add(&st.rays);
+    *rays += st.rays;
     st
 }
 
@@ -169,49 +166,7 @@ pub fn render_first_hit(scene: &PackedScene, pixel: u32, index: u32) -> (Vec3, V
     let st = run(
         scene,
         begin_sample(scene, pixel, index, true),
-        &mut RayCounts64::default(),
+        &mut RayCounts::default(),
     );
-    (st.radiance, st.albedo)
-}
-
-#[derive(Default)]
-struct RayCounts64 {
-    kinds: [u64; 5],
-}
-
-impl RayCounts64 {
-    fn add(&mut self, c: &RayCounts) {
-        for (sum, x) in
-            self.kinds
-                .iter_mut()
-                .zip([c.primary, c.mixed, c.real, c.mixed_shadow, c.real_shadow])
-        {
-            *sum += u64::from(x);
-        }
-    }
-}
-
-#[derive(Default)]
-struct AtomicTotals {
-    kinds: [AtomicU64; 5],
-}
-
-impl AtomicTotals {
-    fn add(&self, c: &RayCounts64) {
-        for (sum, x) in self.kinds.iter().zip(c.kinds) {
-            sum.fetch_add(x, Ordering::Relaxed);
-        }
-    }
-
-    fn get(&self) -> RayTotals {
-        let [primary, mixed, real, mixed_shadow, real_shadow] =
-            [0, 1, 2, 3, 4].map(|i| self.kinds[i].load(Ordering::Relaxed));
-        RayTotals {
-            primary,
-            mixed,
-            real,
-            mixed_shadow,
-            real_shadow,
-        }
-    }
+    (st.result.radiance, st.first_hit.albedo)
 }

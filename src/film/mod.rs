@@ -7,7 +7,7 @@ mod filter;
 mod flip;
 mod pools;
 mod scrambles;
-mod sums;
+pub(crate) mod sums;
 
 pub use accumulation::{Film, MergeError, PixelCounts, PixelKind};
 pub use compare::{Comparison, SizeMismatch, compare};

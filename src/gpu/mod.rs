@@ -18,7 +18,7 @@ pub use buffers::{Changed, SceneBuffers, SceneParts};
 pub use compose::{Composer, Features};
 pub use device::{AdapterChoice, AdapterReport, GpuDevice, list_adapters};
 pub use profile::KernelSeconds;
-pub use wavefront::{GpuBackend, PixelWork};
+pub use wavefront::GpuBackend;
 
 /// What can go wrong on the GPU, in the words the user gets.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -53,6 +53,8 @@ pub enum GpuError {
 
 #[cfg(test)]
 pub(crate) mod layout_test;
+#[cfg(test)]
+mod traffic_test;
 #[cfg(test)]
 mod variants_test;
 #[cfg(test)]

@@ -1,52 +1,25 @@
 //! Runs samples as a wavefront: a batch of them advances one step a dispatch, the finished ones leave the queue, and at the end one
 //! thread a pixel adds the samples to the pixel's sums in their order. What reaches the film does not depend on how the work was cut.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use bytemuck::{Pod, Zeroable};
-
 use super::kernel::{BindGroups, Kernel};
-use super::lanes::{Batch, Counters, Lanes, most_lanes};
+use super::lanes::{Batch, Counters, Lanes, most_lanes, state_parts};
 use super::pacer::Pacer;
 use super::profile::{
     ACCUMULATE, ADVANCE, GENERATE, KERNELS, KernelSeconds, Profiler, TRACE, TURN,
 };
 use super::{Changed, Composer, Features, GpuDevice, GpuError, SceneBuffers, SceneParts};
 use crate::film::Film;
-use crate::packed::{PIXEL_EDGE, PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
-use crate::renderer::{Cancel, Pass, RayTotals};
+use crate::packed::PackedScene;
+use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
 
 /// Samples of one pixel in a batch at most, so that a batch has pixels enough to sum in parallel.
 const MOST_SAMPLES: u32 = 256;
 /// No sample takes so many steps: at 64 bounces a difference chain with a path at each vertex stays under it.
 const MOST_STEPS: u32 = 100_000;
-
-/// Samples `first..end` of a pixel, which are the next ones of its sums.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub struct PixelWork {
-    /// Row-major index.
-    pub pixel: u32,
-    pub first: u32,
-    pub end: u32,
-    pub pad: u32,
-}
-
-impl PixelWork {
-    pub fn new(pixel: u32, samples: std::ops::Range<u32>) -> Self {
-        Self {
-            pixel,
-            first: samples.start,
-            end: samples.end,
-            pad: 0,
-        }
-    }
-
-    fn len(&self) -> u32 {
-        self.end.saturating_sub(self.first)
-    }
-}
 
 /// The estimator on one device, specialised to one scene.
 pub struct GpuBackend {
@@ -56,8 +29,8 @@ pub struct GpuBackend {
     kernels: Vec<Kernel>,
     /// Kernels of other features that were in use before.
     parked: Vec<Parked>,
-    /// Bytes of the state of one sample.
-    path_bytes: u64,
+    /// Bytes of each part of the state of one sample, by name.
+    state_parts: BTreeMap<String, u64>,
     lanes: Option<Lanes>,
     /// By kernel and parity.
     groups: Vec<[BindGroups; 2]>,
@@ -89,12 +62,8 @@ fn compile(
         .collect()
 }
 
-fn path_bytes(kernels: &[Kernel]) -> u64 {
-    kernels[ADVANCE]
-        .bindings()
-        .iter()
-        .find(|binding| binding.name == "paths")
-        .map_or(16, |binding| u64::from(binding.stride))
+fn pacer(gpu: &GpuDevice, state_parts: &BTreeMap<String, u64>) -> Pacer {
+    Pacer::new(most_lanes(gpu, state_parts.values().sum()))
 }
 
 /// One dispatch of a submission.
@@ -162,10 +131,10 @@ impl GpuBackend {
             kernels: std::mem::replace(&mut self.kernels, kernels),
         };
         self.parked.push(before);
-        let path_bytes = path_bytes(&self.kernels);
-        if path_bytes != self.path_bytes {
-            self.path_bytes = path_bytes;
-            self.pacer = Pacer::new(most_lanes(&self.gpu, path_bytes));
+        let state_parts = state_parts(&self.kernels);
+        if state_parts != self.state_parts {
+            self.pacer = pacer(&self.gpu, &state_parts);
+            self.state_parts = state_parts;
         }
         self.lanes = None;
         self.warm = false;
@@ -188,15 +157,15 @@ impl GpuBackend {
         scene: SceneBuffers,
     ) -> Result<Self, GpuError> {
         let kernels = compile(&gpu, composer, features)?;
-        let path_bytes = path_bytes(&kernels);
-        let pacer = Pacer::new(most_lanes(&gpu, path_bytes));
+        let state_parts = state_parts(&kernels);
+        let pacer = pacer(&gpu, &state_parts);
         Ok(Self {
             gpu,
             scene,
             features: *features,
             kernels,
             parked: Vec::new(),
-            path_bytes,
+            state_parts,
             lanes: None,
             groups: Vec::new(),
             pacer,
@@ -234,74 +203,33 @@ impl GpuBackend {
         self.batches_until_loss = Some(batches);
     }
 
-    /// Takes the samples of `work` and adds them to the film; of the real pass if `real_pass`. `keep_going` is told after each batch of
-    /// pixels how many are done and ends the pass by answering false. `rays` grows by the rays traced: primary, mixed, real, mixed
-    /// shadow, real shadow.
+    /// Takes the samples of `work` and adds them to the film, as [`crate::cpu::render::render`] does; `rays` grows by the rays traced.
     ///
-    /// Whatever the outcome, every pixel of the film has taken all of its samples of this pass or none.
+    /// Whatever the outcome, every pixel of the film has taken all of its samples or none.
     ///
     /// # Errors
-    /// [`GpuError::Lost`]: the film keeps what was finished before, and the same work on another backend goes on from there.
+    /// [`GpuError::Lost`]: the film keeps what was finished before, and a list of what is left on another backend goes on from there.
     pub fn render(
         &mut self,
         film: &mut Film,
-        real_pass: bool,
-        work: &[PixelWork],
-        rays: &mut [u64; 5],
-        keep_going: &dyn Fn(u64) -> bool,
+        work: &WorkList,
+        rays: &mut RayCounts,
+        watcher: &Watcher<'_>,
     ) -> Result<(), GpuError> {
-        let mut rest = work;
-        while !rest.is_empty() {
+        // Pixels that share a batch take equally many samples of it: no lanes stay empty.
+        let mut pixels = work.pixels.clone();
+        pixels.sort_by_key(|pixel| std::cmp::Reverse(pixel.samples()));
+        let mut rest = pixels.as_slice();
+        while !rest.is_empty() && !watcher.is_cancelled() {
             let lanes = self.pacer.lanes();
             let lanes = self.prepare(lanes, !film.guides.is_empty())?;
             let (now, later) = rest.split_at(pixels_that_fit(rest, lanes));
             let at_once = (lanes / now.len()).clamp(1, MOST_SAMPLES as usize) as u32;
-            self.render_pixels(film, real_pass, now, at_once, rays)?;
+            self.render_pixels(film, work.pass, now, at_once, rays)?;
             rest = later;
-            if !keep_going(now.len() as u64) {
-                break;
-            }
+            watcher.taken(now.iter().map(|pixel| u64::from(pixel.samples())).sum());
         }
         Ok(())
-    }
-
-    /// Renders a pass into the film, as [`crate::cpu::render::render_pass`] does; `rays` grows by the rays traced.
-    ///
-    /// # Errors
-    /// As [`GpuBackend::render`].
-    pub fn render_pass(
-        &mut self,
-        scene: &PackedScene,
-        film: &mut Film,
-        pass: Pass,
-        cancel: &Cancel<'_>,
-        rays: &mut RayTotals,
-    ) -> Result<(), GpuError> {
-        let (real_pass, work) = match pass {
-            Pass::Main { .. } | Pass::MainRows { .. } => {
-                (false, main_work(&scene.pixels, film, &pass))
-            }
-            Pass::Real { everywhere } | Pass::RealRows { everywhere, .. } => {
-                (true, real_work(&scene.pixels, film, everywhere, &pass))
-            }
-        };
-        if cancel.is_cancelled() {
-            return Ok(());
-        }
-        let mut kinds = [0; 5];
-        let outcome = self.render(film, real_pass, &work, &mut kinds, &|pixels| {
-            cancel.progress(pixels);
-            !cancel.is_cancelled()
-        });
-        let [primary, mixed, real, mixed_shadow, real_shadow] = kinds;
-        *rays += RayTotals {
-            primary,
-            mixed,
-            real,
-            mixed_shadow,
-            real_shadow,
-        };
-        outcome
     }
 
     /// Makes room for `wanted` lanes, or for as many as there is memory for; returns how many may be used.
@@ -313,7 +241,7 @@ impl GpuBackend {
         if present >= wanted {
             return Ok(wanted);
         }
-        match Lanes::new(&self.gpu, wanted, self.path_bytes, with_guides) {
+        match Lanes::new(&self.gpu, wanted, &self.state_parts, with_guides) {
             Ok(lanes) => {
                 self.bind(&lanes)?;
                 self.lanes = Some(lanes);
@@ -342,19 +270,17 @@ impl GpuBackend {
     fn render_pixels(
         &mut self,
         film: &mut Film,
-        real_pass: bool,
+        pass: Pass,
         work: &[PixelWork],
         at_once: u32,
-        rays: &mut [u64; 5],
+        rays: &mut RayCounts,
     ) -> Result<(), GpuError> {
         let Some(lanes) = self.lanes.take() else {
             return Err(GpuError::Lost("no room for samples".to_owned()));
         };
-        let outcome = self.render_pixels_on(&lanes, film, real_pass, work, at_once);
+        let outcome = self.render_pixels_on(&lanes, film, pass, work, at_once);
         self.lanes = Some(lanes);
-        for (sum, n) in rays.iter_mut().zip(outcome?) {
-            *sum += n;
-        }
+        *rays += outcome?;
         Ok(())
     }
 
@@ -362,10 +288,10 @@ impl GpuBackend {
         &mut self,
         lanes: &Lanes,
         film: &mut Film,
-        real_pass: bool,
+        pass: Pass,
         work: &[PixelWork],
         at_once: u32,
-    ) -> Result<[u64; 5], GpuError> {
+    ) -> Result<RayCounts, GpuError> {
         let gather = |pixel: &PixelWork| film.pixels[pixel.pixel as usize];
         let sums: Vec<_> = work.iter().map(gather).collect();
         let guides: Vec<_> = if lanes.with_guides {
@@ -375,8 +301,9 @@ impl GpuBackend {
         };
         lanes.upload(&self.gpu, work, &sums, &guides);
 
-        let longest = work.iter().map(PixelWork::len).max().unwrap_or(0);
-        let mut rays = [0; 5];
+        let longest = work.iter().map(PixelWork::samples).max().unwrap_or(0);
+        let real_pass = pass == Pass::Real;
+        let mut rays = RayCounts::default();
         let mut sample_offset = 0;
         while sample_offset < longest {
             let sample_count = at_once.min(longest - sample_offset);
@@ -393,9 +320,7 @@ impl GpuBackend {
             sample_offset += sample_count;
             let counters =
                 self.finish_batch(lanes, &batch, film, work, sample_offset == longest)?;
-            for (sum, n) in rays.iter_mut().zip(counters.rays) {
-                *sum += u64::from(n);
-            }
+            rays += counters.rays;
         }
         Ok(rays)
     }
@@ -405,8 +330,7 @@ impl GpuBackend {
         self.count_down_to_loss();
         let queue = &self.gpu.queue;
         queue.write_buffer(&lanes.batch, 0, bytemuck::bytes_of(batch));
-        let zero = Counters::default();
-        queue.write_buffer(&lanes.counters, 0, bytemuck::bytes_of(&zero));
+        lanes.clear_counters(&self.gpu);
 
         // The first queue is written with parity 1, so that parity 0 reads it.
         let mut parity = 0;
@@ -546,54 +470,13 @@ impl GpuBackend {
     }
 }
 
-/// The samples that every pixel within reach of something virtual still lacks.
-pub(super) fn main_work(pixels: &[PixelInfo], film: &Film, pass: &Pass) -> Vec<PixelWork> {
-    let mut work: Vec<PixelWork> = (0..film.pixels.len())
-        .filter(|&pixel| pixels[pixel].flags & PIXEL_OUT_OF_REACH == 0)
-        .map(|pixel| {
-            let next = film.first_index(pixel) + film.pixels[pixel].n;
-            let end = pass.end_of_row(pixel / film.width as usize);
-            PixelWork::new(pixel as u32, next..film.end_index(pixel, end))
-        })
-        .filter(|work| work.len() > 0)
-        .collect();
-    // Pixels that share a batch take equally many samples of it: no lanes stay empty.
-    work.sort_by_key(|work| std::cmp::Reverse(work.len()));
-    work
-}
-
-/// The real samples that edge pixels lack; `everywhere`: those of all pixels that are not wholly virtual.
-pub(super) fn real_work(
-    pixels: &[PixelInfo],
-    film: &Film,
-    everywhere: bool,
-    pass: &Pass,
-) -> Vec<PixelWork> {
-    film.pixels
-        .iter()
-        .enumerate()
-        .filter(|&(pixel, sums)| {
-            let known_edge = pixels[pixel].flags & PIXEL_EDGE != 0;
-            sums.n_real < sums.n
-                && (known_edge || film.needs_real(pixel) || (everywhere && sums.m < sums.n))
-        })
-        .map(|(pixel, sums)| {
-            let first = film.first_index(pixel);
-            let end = pass.end_of_row(pixel / film.width as usize);
-            let end = film.end_index(pixel, end).min(first + sums.n);
-            PixelWork::new(pixel as u32, first + sums.n_real..end)
-        })
-        .filter(|work| work.len() > 0)
-        .collect()
-}
-
 /// How many of the first pixels of `work` take their samples, or [`MOST_SAMPLES`] of them, in one batch of `lanes`; at least one.
 fn pixels_that_fit(work: &[PixelWork], lanes: usize) -> usize {
     let mut longest = 1;
     work.iter()
         .enumerate()
         .position(|(before, pixel)| {
-            longest = longest.max(pixel.len().min(MOST_SAMPLES) as usize);
+            longest = longest.max(pixel.samples().min(MOST_SAMPLES) as usize);
             (before + 1) * longest > lanes
         })
         .map_or(work.len(), |fitting| fitting.max(1))

@@ -1,65 +1,56 @@
 //! The wavefront on a toy estimator, bit for bit against the same toy in Rust.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use bytemuck::Zeroable;
 use glam::Vec3;
 
 use super::harness::test_device;
-use super::wavefront::{main_work, real_work};
 use super::*;
 use crate::film::{Film, Guide, Sample};
-use crate::packed::{Frame, PIXEL_OUT_OF_REACH, PixelInfo};
-use crate::renderer::Pass;
-
-const STATE: &str = "
-const STAGE_DONE: u32 = 0u;
-const FAR: f32 = 3.40282346638528859812e38;
-struct RayCounts { primary: u32, mixed: u32, real: u32, mixed_shadow: u32, real_shadow: u32 }
-struct PathState {
-    pixel: u32, index: u32, stage: u32, word: u32,
-    radiance: vec3<f32>, mask: u32, radiance_real: vec3<f32>, depth_m: f32, normal: vec3<f32>, hit_real: u32,
-    albedo: vec3<f32>, hit_virtual: u32, rays: RayCounts,
-}";
+use crate::packed::Frame;
+use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
 
 /// A walk that ends at each step with probability 1/8; what it 'hits' is a hash of where it is.
 const ESTIMATOR: &str = "
 import package::gpu::buffers::frame;
-import package::cpu::state::{PathState, STAGE_DONE};
+import package::cpu::state::{PathState, STAGE_DONE, path_first_hits, path_results, path_state};
 import package::toy::mix_bits;
-fn begin_sample(pixel: u32, index: u32, real_pass: bool) -> PathState {
-    var path: PathState;
-    path.pixel = pixel;
-    path.index = index;
-    path.stage = select(1u, 2u, real_pass);
-    path.word = mix_bits(pixel * 65537u + index + frame.seed);
-    path.depth_m = 1.0;
-    path.rays.primary = 1u;
-    if path.word % 16u == 3u { path.stage = STAGE_DONE; }
-    return path;
+fn begin_sample(lane: u32, pixel: u32, index: u32, real_pass: bool) -> PathState {
+    var st = path_state(lane, pixel, index);
+    st.path.stage = select(1u, 2u, real_pass);
+    st.path.medium = mix_bits(pixel * 65537u + index + frame.seed);
+    st.ray.depth = st.path.medium ^ st.path.stage;
+    st.rays.primary = 1u;
+    if st.path.medium % 16u == 3u { st.path.stage = STAGE_DONE; }
+    return st;
 }
-fn advance(path: ptr<function, PathState>) {
-    let x = f32((*path).hit_real >> 8u) / 16777216.0;
-    (*path).word = (*path).hit_real;
-    (*path).mask = (*path).hit_real & 1u;
-    (*path).radiance += vec3<f32>(x, 1.0 - x, x * 0.5);
-    (*path).normal += vec3<f32>(x);
-    if (*path).hit_real % 8u == 0u { (*path).stage = STAGE_DONE; }
+fn advance(st: ptr<function, PathState>) {
+    let word = (*st).hits.in_real.triangle;
+    let x = f32(word >> 8u) / 16777216.0;
+    let lane = (*st).lane;
+    (*st).ray.depth = word ^ (*st).path.stage;
+    path_results[lane].mask = word & 1u;
+    path_results[lane].radiance += vec3<f32>(x, 1.0 - x, x * 0.5);
+    path_first_hits[lane].normal = path_results[lane].radiance.xxx;
+    path_first_hits[lane].albedo = vec3<f32>(0.0);
+    path_first_hits[lane].depth_m = 1.0;
+    if word % 8u == 0u { (*st).path.stage = STAGE_DONE; }
 }";
 
 const REQUEST: &str = "
 import package::cpu::state::PathState;
 import package::toy::mix_bits;
-fn answer(path: ptr<function, PathState>, thread: u32) {
-    (*path).hit_real = mix_bits((*path).word ^ (*path).stage);
-    (*path).rays.mixed += 1u;
+fn answer(st: ptr<function, PathState>, thread: u32) {
+    (*st).hits.in_real.triangle = mix_bits((*st).ray.depth);
+    (*st).rays.mixed += 1u;
 }";
 
 const TOY: &str = "fn mix_bits(word: u32) -> u32 { var x = word; x ^= x >> 16u; x *= 0x7feb352du; return x ^ (x >> 15u); }";
 
 pub(super) fn composer() -> Composer {
     Composer::default()
-        .with_module("cpu::state", STATE)
         .with_module("cpu::estimator", ESTIMATOR)
         .with_module("cpu::request", REQUEST)
         .with_module("toy", TOY)
@@ -99,7 +90,7 @@ fn toy_sample(seed: u32, pixel: u32, index: u32, real_pass: bool) -> (Sample, u6
         is_virtual: mask != 0,
         contribution: radiance,
         real: None,
-        guide: Some(Guide {
+        guide: (rays > 0).then_some(Guide {
             depth_m: 1.0,
             normal,
             albedo: Vec3::ZERO,
@@ -109,9 +100,10 @@ fn toy_sample(seed: u32, pixel: u32, index: u32, real_pass: bool) -> (Sample, u6
 }
 
 /// Twin of [`GpuBackend::render`]; returns the mixed rays.
-fn toy_render(seed: u32, film: &mut Film, real_pass: bool, work: &[PixelWork]) -> u64 {
+fn toy_render(seed: u32, film: &mut Film, work: &WorkList) -> u64 {
     let mut total = 0;
-    for w in work {
+    let real_pass = work.pass == Pass::Real;
+    for w in &work.pixels {
         for index in w.first..w.end {
             let (sample, rays) = toy_sample(seed, w.pixel, index, real_pass);
             let pixel = w.pixel as usize;
@@ -145,18 +137,25 @@ fn toy_backend(gpu: &Arc<GpuDevice>, seed: u32) -> GpuBackend {
 }
 
 /// The next samples of every other pixel up to `end`, some pixels lagging behind.
-fn work_to(film: &Film, end: u32) -> Vec<PixelWork> {
-    (0..WIDTH * HEIGHT)
+fn work_to(film: &Film, end: u32) -> WorkList {
+    let pixels = (0..WIDTH * HEIGHT)
         .filter(|pixel| pixel % 2 == 0)
         .map(|pixel| {
             let lag = u32::from(pixel % 14 == 0);
             PixelWork::new(pixel, film.pixels[pixel as usize].n..end - lag)
         })
-        .collect()
+        .collect();
+    WorkList {
+        pass: Pass::Main,
+        pixels,
+    }
 }
 
-fn go_on(_: u64) -> bool {
-    true
+fn real_work(pixels: Vec<PixelWork>) -> WorkList {
+    WorkList {
+        pass: Pass::Real,
+        pixels,
+    }
 }
 
 #[test]
@@ -166,27 +165,32 @@ fn passes_give_the_bits_of_the_twin_however_they_are_cut() {
     let mut rays = 0;
     for end in [9, 30] {
         let work = work_to(&expected, end);
-        rays += toy_render(7, &mut expected, false, &work);
+        rays += toy_render(7, &mut expected, &work);
     }
 
     let mut film = Film::new(WIDTH, HEIGHT, 0, true);
     let mut backend = toy_backend(gpu, 7);
-    let mut traced = [0; 5];
+    let mut traced = RayCounts::default();
     for end in [2, 9, 30] {
         let work = work_to(&film, end);
         backend
-            .render(&mut film, false, &work, &mut traced, &go_on)
+            .render(&mut film, &work, &mut traced, &Watcher::none())
             .expect("renders");
     }
     assert_eq!(film, expected);
     let samples: u64 = expected.pixels.iter().map(|p| u64::from(p.n)).sum();
-    assert_eq!(traced, [samples, rays, 0, 0, 0]);
+    let all = RayCounts {
+        primary: samples,
+        mixed: rays,
+        ..RayCounts::default()
+    };
+    assert_eq!(traced, all);
 
     // Negative control: another seed gives another film.
     let mut other = Film::new(WIDTH, HEIGHT, 0, true);
     let work = work_to(&other, 30);
     toy_backend(gpu, 8)
-        .render(&mut other, false, &work, &mut traced, &go_on)
+        .render(&mut other, &work, &mut traced, &Watcher::none())
         .expect("renders");
     assert_ne!(other.pixels, expected.pixels);
 }
@@ -194,21 +198,20 @@ fn passes_give_the_bits_of_the_twin_however_they_are_cut() {
 #[test]
 fn the_real_pass_fills_its_own_sums() {
     let Some(gpu) = test_device() else { return };
-    let mut rays = [0; 5];
+    let mut rays = RayCounts::default();
     let start = {
         let mut film = Film::new(WIDTH, HEIGHT, 0, false);
         let work = work_to(&film, 5);
-        toy_render(1, &mut film, false, &work);
+        toy_render(1, &mut film, &work);
         film
     };
-    let work: Vec<PixelWork> = (0..40)
-        .map(|i| PixelWork::new(2 * i, 0..start.pixels[2 * i as usize].n))
-        .collect();
+    let pixels = (0..40).map(|i| PixelWork::new(2 * i, 0..start.pixels[2 * i as usize].n));
+    let work = real_work(pixels.collect());
     let mut expected = start.clone();
-    toy_render(1, &mut expected, true, &work);
+    toy_render(1, &mut expected, &work);
     let mut film = start;
     toy_backend(gpu, 1)
-        .render(&mut film, true, &work, &mut rays, &go_on)
+        .render(&mut film, &work, &mut rays, &Watcher::none())
         .expect("renders");
     assert_eq!(film, expected);
     assert!(film.pixels[0].n_real == 4 && film.pixels[2].n_real == 5);
@@ -218,13 +221,16 @@ fn the_real_pass_fills_its_own_sums() {
 #[test]
 fn one_pixel_takes_more_samples_than_a_loop_may_have_rounds() {
     let Some(gpu) = test_device() else { return };
-    let mut rays = [0; 5];
+    let mut rays = RayCounts::default();
     let mut expected = Film::new(WIDTH, HEIGHT, 0, false);
-    let work = [PixelWork::new(11, 0..70_000)];
-    toy_render(3, &mut expected, false, &work);
+    let work = WorkList {
+        pass: Pass::Main,
+        pixels: vec![PixelWork::new(11, 0..70_000)],
+    };
+    toy_render(3, &mut expected, &work);
     let mut film = Film::new(WIDTH, HEIGHT, 0, false);
     toy_backend(gpu, 3)
-        .render(&mut film, false, &work, &mut rays, &go_on)
+        .render(&mut film, &work, &mut rays, &Watcher::none())
         .expect("renders");
     assert_eq!(film, expected);
 }
@@ -238,52 +244,60 @@ fn after_a_loss_another_backend_goes_on_with_whole_pixels() {
     let mut film = Film::new(WIDTH, HEIGHT, 0, true);
     let mut backend = toy_backend(&own, 5);
     backend.lose_device_after(2);
-    let mut rays = [0; 5];
+    let mut rays = RayCounts::default();
     // Two batches of the least size, then the loss.
     let work = work_to(&film, 8);
     let error = backend
-        .render(&mut film, false, &work, &mut rays, &go_on)
+        .render(&mut film, &work, &mut rays, &Watcher::none())
         .expect_err("the device is lost");
     assert!(matches!(error, GpuError::Lost(_)), "{error}");
-    let again = backend.render(&mut film, false, &work[..1], &mut rays, &go_on);
+    let again = backend.render(&mut film, &work, &mut rays, &Watcher::none());
     assert!(again.is_err(), "a lost device stays lost");
 
     let done = film.pixels.iter().filter(|p| p.n > 0).count();
     assert!(
-        done > 0 && done < work.len(),
+        done > 0 && done < work.pixels.len(),
         "{done} pixels of {}",
-        work.len()
+        work.pixels.len()
     );
     assert!(film.pixels.iter().all(|p| [0, 7, 8].contains(&p.n)));
     let taken: u64 = film.pixels.iter().map(|p| u64::from(p.n)).sum();
-    assert_eq!(rays[0], taken, "rays of what was finished are counted");
+    assert_eq!(rays.primary, taken, "rays of what was finished are counted");
 
     let mut expected = Film::new(WIDTH, HEIGHT, 0, true);
-    toy_render(5, &mut expected, false, &work);
+    toy_render(5, &mut expected, &work);
     assert_ne!(film, expected, "control: something was missing");
-    let rest = work_to(&film, 8);
-    toy_render(5, &mut film, false, &rest);
+    let rest = work.left(&film);
+    assert!(!rest.is_empty() && rest.pixels.len() + done == work.pixels.len());
+    toy_render(5, &mut film, &rest);
     assert_eq!(film, expected);
 }
 
 #[test]
 fn a_stopped_pass_leaves_whole_pixels() {
     let Some(gpu) = test_device() else { return };
-    let mut rays = [0; 5];
+    let mut rays = RayCounts::default();
     let mut film = Film::new(WIDTH, HEIGHT, 0, false);
     let work = work_to(&film, 20);
+    let asked = AtomicU32::new(0);
+    let after_one_batch = || asked.fetch_add(1, Ordering::Relaxed) > 0;
     toy_backend(gpu, 2)
-        .render(&mut film, false, &work, &mut rays, &|_| false)
+        .render(
+            &mut film,
+            &work,
+            &mut rays,
+            &Watcher::none().cancelled_by(&after_one_batch),
+        )
         .expect("stops");
     let done = film.pixels.iter().filter(|p| p.n > 0).count();
-    assert!(done > 0 && done < work.len(), "{done}");
+    assert!(done > 0 && done < work.pixels.len(), "{done}");
     assert!(film.pixels.iter().all(|p| [0, 19, 20].contains(&p.n)));
 }
 
 #[test]
 fn kernels_are_timed_where_the_device_can() {
     let Some(gpu) = test_device() else { return };
-    let mut rays = [0; 5];
+    let mut rays = RayCounts::default();
     let mut backend = toy_backend(gpu, 2);
     if !backend.profile() {
         eprintln!("skipped: {} takes no timestamps", gpu.name());
@@ -292,45 +306,11 @@ fn kernels_are_timed_where_the_device_can() {
     let mut film = Film::new(WIDTH, HEIGHT, 0, false);
     let work = work_to(&film, 2);
     backend
-        .render(&mut film, false, &work, &mut rays, &go_on)
+        .render(&mut film, &work, &mut rays, &Watcher::none())
         .expect("renders");
     let seconds = backend.kernel_seconds().expect("profiled");
     assert!(
         seconds.generate > 0.0 && seconds.advance > 0.0 && seconds.accumulate > 0.0,
         "{seconds:?}"
-    );
-}
-
-#[test]
-fn a_pass_asks_for_what_each_pixel_lacks() {
-    let mut film = Film::new(4, 1, 10, false);
-    for index in 0..3 {
-        let sample = |is_virtual| Sample {
-            is_virtual,
-            contribution: Vec3::ONE,
-            real: None,
-            guide: None,
-        };
-        film.add(1, &sample(index == 0));
-        film.add(2, &sample(false));
-    }
-    let mut pixels = [PixelInfo::uniform(0); 4];
-    pixels[3].flags = PIXEL_OUT_OF_REACH;
-    let work = |pixel, samples| PixelWork::new(pixel, samples);
-    assert_eq!(
-        main_work(&pixels, &film, &Pass::Main { end: 14 }),
-        [work(0, 10..14), work(1, 13..14), work(2, 13..14)]
-    );
-    assert_eq!(
-        main_work(&pixels, &film, &Pass::Main { end: 13 }),
-        [work(0, 10..13)]
-    );
-    assert_eq!(
-        real_work(&pixels, &film, false, &Pass::Real { everywhere: false }),
-        [work(1, 10..13)]
-    );
-    assert_eq!(
-        real_work(&pixels, &film, true, &Pass::Real { everywhere: true }),
-        [work(1, 10..13), work(2, 10..13)]
     );
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bytemuck::Zeroable;
 
-use super::channels::ChannelFile;
+use super::ChannelFile;
 use super::exr_file::{Channels, push_channel, write_layers};
 use super::{Metadata, OutputError, Target};
 use crate::film::{Film, GuideSums, Picture, PixelSums, Planes, Sum3};

@@ -5,16 +5,19 @@
 //! underrated takes further scrambles of the same kind. Every sample that is taken counts, whatever it brings.
 
 use std::rc::Rc;
+use std::time::Instant;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::series::{Run, Series};
+use super::core::{Core, is_within_reach};
+use super::series::Series;
+use super::stopwatch::Stopwatch;
 use super::tiles::{MARGIN, Tiles, Trial, gain_for};
-use super::watch::Watch;
-use super::{ErrorGoal, Progress, RenderError, Renderer, Skip};
+use super::{Driver, ErrorGoal, RenderError, Renderer, Skip};
 use crate::film::{Film, Scrambles, composite, pooled};
-use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PixelInfo};
+use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
+use crate::work::Watcher;
 
 /// Independent scrambles that make the picture, at the least.
 pub const SCRAMBLES: u32 = 16;
@@ -58,91 +61,106 @@ impl Stated {
 
 impl Renderer {
     /// Renders the film anew until every tile's stated error is as low as the goal, or its pixels have taken as many rays as the goal allows. The
-    /// film is then complete: [`Renderer::advance`] adds nothing to it. `progress` counts scrambles, the pilot's included.
+    /// film is then complete: [`Renderer::advance`] adds nothing to it. The watcher hears of scrambles, the pilot's included.
     ///
-    /// Ended by `cancelled`, it keeps the scrambles that are complete.
+    /// Ended by the watcher, it keeps the scrambles that are complete.
     ///
     /// # Errors
     /// As [`Renderer::advance`].
     pub fn render_to_error(
         &mut self,
         goal: &ErrorGoal,
-        cancelled: &(dyn Fn() -> bool + Sync),
-        progress: &mut dyn FnMut(Progress),
+        watcher: &Watcher<'_>,
     ) -> Result<(), RenderError> {
-        if !self.instants.is_empty() {
+        if matches!(self.driver, Driver::Moving(_)) {
             return Err(RenderError::MovingGoal);
         }
-        let goal = &goal.without(self.options.without);
         if self.stated.is_some() {
-            self.look_ahead();
+            self.look_ahead(watcher);
         }
-        let watch = Watch::start();
-        let frame = self.packed.frame;
-        self.packed.frame.rays_total = 1;
-        self.film.first_sample = 0;
-        let mut run = Run {
-            goal,
-            cancelled,
-            progress,
-            start: watch.begin,
+        let stopwatch = Stopwatch::start();
+        let core = &mut self.core;
+        let frame = core.packed.frame;
+        core.packed.frame.rays_total = 1;
+        core.film.first_sample = 0;
+        let mut driver = ToError {
+            tiles: Tiles::of(core.film.width as usize, core.film.height as usize),
+            goal: goal.without(core.options.without),
+            watcher: *watcher,
+            begin: stopwatch.begin,
             done: 0,
             expected: 2 * TRIAL_SCRAMBLES + SCRAMBLES,
+            core,
         };
-        let tiles = Tiles::of(self.film.width as usize, self.film.height as usize);
-        let outcome = self.pilot_and_picture(&tiles, &mut run);
-        self.packed.frame = frame;
-        self.send_frame();
-        self.state(goal, &tiles, outcome?);
-        self.count_render(&watch);
+        let outcome = driver.pilot_and_picture();
+        driver.core.packed.frame = frame;
+        driver.core.backend.set_frame(&driver.core.packed);
+        self.stated = Some(driver.state(outcome?));
+        self.core.count_render(&stopwatch);
         Ok(())
     }
 
+    /// The error that the scrambles of [`Renderer::render_to_error`] state; `None` for a render by rays per pixel.
+    pub fn stated(&self) -> Option<&Stated> {
+        self.stated.as_ref()
+    }
+}
+
+/// The driver of a render to an error.
+pub(super) struct ToError<'a> {
+    pub core: &'a mut Core,
+    pub tiles: Tiles,
+    pub watcher: Watcher<'a>,
+    pub begin: Instant,
+    /// Scrambles completed and expected.
+    pub done: u32,
+    pub expected: u32,
+    goal: ErrorGoal,
+}
+
+impl ToError<'_> {
     /// The picture's scrambles, or the pilot's where it was ended before the first of them.
-    fn pilot_and_picture(
-        &mut self,
-        tiles: &Tiles,
-        run: &mut Run<'_>,
-    ) -> Result<Series, RenderError> {
-        let plan = self.packed.pixels.clone();
-        let most = (run.goal.max_rays_per_pixel / SCRAMBLES).max(1);
+    fn pilot_and_picture(&mut self) -> Result<Series, RenderError> {
+        let plan = self.core.packed.pixels.clone();
+        let tiles = self.tiles.clone();
+        let most = (self.goal.max_rays_per_pixel / SCRAMBLES).max(1);
         let scaled = |gains: &[f64]| -> Vec<PixelInfo> {
             let each = plan.par_iter().enumerate();
             each.map(|(pixel, &info)| scale(info, gains[tiles.of_pixel(pixel)], most))
                 .collect()
         };
         let all: Rc<[bool]> = vec![true; tiles.count()].into();
-        if run.goal.takes_all_rays() {
-            run.expected = SCRAMBLES;
+        if self.goal.takes_all_rays() {
+            self.expected = SCRAMBLES;
             self.plan(scaled(&vec![f64::from(most); tiles.count()]))?;
-            return self.series(0, SCRAMBLES, &all, tiles, run);
+            return self.series(0, SCRAMBLES, &all);
         }
 
         let even = vec![1.0; tiles.count()];
         self.plan(scaled(&even))?;
-        let first = self.series(FIRST_TRIAL, TRIAL_SCRAMBLES, &all, tiles, run)?;
+        let first = self.series(FIRST_TRIAL, TRIAL_SCRAMBLES, &all)?;
         if first.count() < TRIAL_SCRAMBLES {
             return Ok(first);
         }
-        let first_trial = self.trial(tiles, &even, &first.sum, run.goal);
-        let second_trial = self.second_trial(tiles, &first_trial, &scaled, run)?;
+        let first_trial = self.trial(&even, &first.sum);
+        let second_trial = self.second_trial(&first_trial, &scaled)?;
         let mut gains: Vec<f64> = first_trial
             .iter()
             .zip(second_trial)
             .map(|(&first, second)| gain_for(first, second).max(LEAST_GAIN))
             .collect();
-        if self.options.without.contains(Skip::Adaptive) {
+        if self.core.options.without.contains(Skip::Adaptive) {
             let greatest = gains.iter().copied().fold(LEAST_GAIN, f64::max);
             gains.fill(greatest);
         }
 
         self.plan(scaled(&gains))?;
-        let mut series = self.series(0, SCRAMBLES, &all, tiles, run)?;
+        let mut series = self.series(0, SCRAMBLES, &all)?;
         if series.count() == 0 {
             return Ok(first);
         }
         if series.count() == SCRAMBLES {
-            self.mend(&mut series, tiles, run)?;
+            self.mend(&mut series)?;
         }
         Ok(series)
     }
@@ -150,44 +168,37 @@ impl Renderer {
     /// Tries those tiles again that need much more than the first trial took.
     fn second_trial(
         &mut self,
-        tiles: &Tiles,
         first: &[Trial],
         scaled: &dyn Fn(&[f64]) -> Vec<PixelInfo>,
-        run: &mut Run<'_>,
     ) -> Result<Vec<Option<Trial>>, RenderError> {
         let wanted = |trial: &Trial| (trial.need * trial.gain * SECOND_TRIAL_SHARE).round();
         let taking_part: Rc<[bool]> = first.iter().map(|trial| wanted(trial) >= 2.0).collect();
         if !taking_part.contains(&true) {
-            return Ok(vec![None; tiles.count()]);
+            return Ok(vec![None; self.tiles.count()]);
         }
         let gains: Vec<f64> = first.iter().map(|trial| wanted(trial).max(1.0)).collect();
         self.plan(scaled(&gains))?;
-        let second = self.series(SECOND_TRIAL, TRIAL_SCRAMBLES, &taking_part, tiles, run)?;
+        let second = self.series(SECOND_TRIAL, TRIAL_SCRAMBLES, &taking_part)?;
         if second.count() < TRIAL_SCRAMBLES {
-            return Ok(vec![None; tiles.count()]);
+            return Ok(vec![None; self.tiles.count()]);
         }
-        let measured = self.trial(tiles, &gains, &second.sum, run.goal);
+        let measured = self.trial(&gains, &second.sum);
         let each = measured.into_iter().zip(taking_part.iter());
         Ok(each.map(|(trial, &took)| took.then_some(trial)).collect())
     }
 
     /// Further scrambles for the tiles that stay above the goal, as far as their pixels may take rays.
-    fn mend(
-        &mut self,
-        series: &mut Series,
-        tiles: &Tiles,
-        run: &mut Run<'_>,
-    ) -> Result<(), RenderError> {
+    fn mend(&mut self, series: &mut Series) -> Result<(), RenderError> {
         let mut number = SCRAMBLES;
-        let mut counts = vec![SCRAMBLES; tiles.count()];
-        let most: Vec<u32> = tiles
-            .greatest_factors(&self.packed.pixels)
+        let mut counts = vec![SCRAMBLES; self.tiles.count()];
+        let most: Vec<u32> = (self.tiles)
+            .greatest_factors(&self.core.packed.pixels)
             .into_iter()
-            .map(|factor| run.goal.max_rays_per_pixel / factor.max(1))
+            .map(|factor| self.goal.max_rays_per_pixel / factor.max(1))
             .collect();
         loop {
-            let over = self.over_goal(tiles, &series.sum, run.goal);
-            let more: Vec<u32> = (0..tiles.count())
+            let over = self.over_goal(&series.sum);
+            let more: Vec<u32> = (0..self.tiles.count())
                 .map(|tile| {
                     if over[tile] <= 1.0 {
                         return 0;
@@ -202,12 +213,12 @@ impl Renderer {
                 })
                 .collect();
             let longest = more.iter().copied().max().unwrap_or(0);
-            run.expected += longest;
+            self.expected += longest;
             let numbers = (0..longest).map(|i| {
                 let taking_part: Rc<[bool]> = more.iter().map(|&more| i < more).collect();
                 (number + i, taking_part)
             });
-            if longest == 0 || !self.extend(series, numbers, tiles, run)? {
+            if longest == 0 || !self.extend(series, numbers)? {
                 return Ok(());
             }
             number += longest;
@@ -218,16 +229,10 @@ impl Renderer {
     }
 
     /// What a trial tells of each tile.
-    fn trial(
-        &self,
-        tiles: &Tiles,
-        gains: &[f64],
-        trial: &Scrambles,
-        goal: &ErrorGoal,
-    ) -> Vec<Trial> {
-        let own = trial.own_variances(self.scene.photo.as_ref());
-        let ratios = self.ratios(trial, &own, goal);
-        let each = tiles.cautious_means(&ratios).into_iter().zip(gains);
+    fn trial(&self, gains: &[f64], trial: &Scrambles) -> Vec<Trial> {
+        let own = trial.own_variances(self.core.scene.photo.as_ref());
+        let ratios = self.ratios(trial, &own);
+        let each = self.tiles.cautious_means(&ratios).into_iter().zip(gains);
         each.map(|(over, &gain)| Trial {
             gain,
             need: over / f64::from(SCRAMBLES),
@@ -236,68 +241,59 @@ impl Renderer {
     }
 
     /// Variance over the variance allowed, mean over the channels, by pixel.
-    fn ratios(
-        &self,
-        scrambles: &Scrambles,
-        variances: &[Option<DVec3>],
-        goal: &ErrorGoal,
-    ) -> Vec<(usize, f64)> {
-        let photo = self.scene.photo.as_ref();
-        let picture = composite(scrambles.film(), photo, self.scene.settings.composite);
+    fn ratios(&self, scrambles: &Scrambles, variances: &[Option<DVec3>]) -> Vec<(usize, f64)> {
+        let photo = self.core.scene.photo.as_ref();
+        let picture = composite(scrambles.film(), photo, self.core.scene.settings.composite);
         (variances.iter().enumerate())
             .filter_map(|(pixel, variance)| {
-                let allowed = goal.allowed_variance(picture.linear[pixel]);
+                let allowed = self.goal.allowed_variance(picture.linear[pixel]);
                 Some((pixel, ((*variance)? / allowed).element_sum() / 3.0))
             })
             .collect()
     }
 
     /// Stated variance over the variance allowed, mean over each tile's pixels and channels.
-    fn over_goal(&self, tiles: &Tiles, scrambles: &Scrambles, goal: &ErrorGoal) -> Vec<f64> {
-        tiles.means(&self.ratios(scrambles, &self.stated_variances(scrambles), goal))
+    fn over_goal(&self, scrambles: &Scrambles) -> Vec<f64> {
+        let stated = self.stated_variances(scrambles);
+        self.tiles.means(&self.ratios(scrambles, &stated))
     }
 
     /// Variance of the mean of the scrambles that is stated for each pixel: the pixel's own, pooled with that of other pixels whose rays may meet
     /// something virtual, or of others whose rays may not. This is known before the first sample, as it must be: pixels that are alike by
     /// what was found, say those in which no ray has met anything virtual, have less variance by what was found than in truth.
     fn stated_variances(&self, scrambles: &Scrambles) -> Vec<Option<DVec3>> {
-        let mut own = scrambles.own_variances(self.scene.photo.as_ref());
+        let mut own = scrambles.own_variances(self.core.scene.photo.as_ref());
         for (pixel, own) in own.iter_mut().enumerate() {
             if let Some(own) = own {
                 *own /= f64::from(scrambles.count(pixel));
             }
         }
         let meets = |info: &PixelInfo| u8::from(info.flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0);
-        let classes: Vec<u8> = self.packed.pixels.iter().map(meets).collect();
-        let stated = pooled(self.film.width as usize, &own, &classes).into_iter();
+        let classes: Vec<u8> = self.core.packed.pixels.iter().map(meets).collect();
+        let stated = pooled(self.core.film.width as usize, &own, &classes).into_iter();
         stated
             .zip(own)
             .map(|(stated, own)| own.map(|_| stated))
             .collect()
     }
 
-    /// Makes the scrambles' sum the film.
-    fn state(&mut self, goal: &ErrorGoal, tiles: &Tiles, series: Series) {
-        let over = self.over_goal(tiles, &series.sum, goal);
-        let reached = tiles.reached(&self.packed.pixels);
-        let above = over.iter().filter(|over| **over > 1.0);
-        let stated = self.stated_variances(&series.sum);
-        self.stated = Some(Stated {
+    /// Makes the scrambles' sum the film, and states its error.
+    fn state(self, series: Series) -> Stated {
+        let over = self.over_goal(&series.sum);
+        let variances = self.stated_variances(&series.sum);
+        let pixels = &self.core.packed.pixels;
+        let stated = Stated {
             scrambles: series.count().min(SCRAMBLES),
-            variance: stated
+            variance: variances
                 .iter()
                 .map(|v| v.unwrap_or_default().as_vec3().to_array())
                 .collect(),
-            mean_rays_per_pixel: mean_rays(series.sum.film(), &self.packed.pixels),
-            tiles: reached.iter().filter(|&&r| r).count(),
-            tiles_above_goal: above.count(),
-        });
-        self.film = series.sum.into_film();
-    }
-
-    /// The error that the scrambles of [`Renderer::render_to_error`] state; `None` for a render by rays per pixel.
-    pub fn stated(&self) -> Option<&Stated> {
-        self.stated.as_ref()
+            mean_rays_per_pixel: mean_rays(series.sum.film(), pixels),
+            tiles: self.tiles.reached(pixels).iter().filter(|&&r| r).count(),
+            tiles_above_goal: over.iter().filter(|over| **over > 1.0).count(),
+        };
+        self.core.film = series.sum.into_film();
+        stated
     }
 }
 
@@ -305,7 +301,7 @@ impl Renderer {
 fn mean_rays(film: &Film, pixels: &[PixelInfo]) -> f64 {
     let (mut samples, mut reached) = (0, 0);
     for (sums, info) in film.pixels.iter().zip(pixels) {
-        if info.flags & PIXEL_OUT_OF_REACH == 0 {
+        if is_within_reach(info) {
             samples += u64::from(sums.n);
             reached += 1;
         }

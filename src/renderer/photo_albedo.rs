@@ -16,6 +16,7 @@ use crate::packed::{
     MATERIAL_PHOTO_ALBEDO, NONE, PackedScene,
 };
 use crate::scene::Photo;
+use crate::work::{Meter, Phase, Watcher};
 
 /// Largest albedo: above it paths would hardly end, and no diffuse surface is whiter.
 const MAX_ALBEDO: f32 = 0.98;
@@ -40,13 +41,14 @@ struct Seen {
 }
 
 /// Fills `scene.photo_albedo` so that the converged Ir reproduces the photograph.
-pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo) {
+pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo, watcher: &Watcher<'_>) {
     let seen = first_surfaces(scene, |flags| flags & MATERIAL_PHOTO_ALBEDO != 0);
     scene.photo_albedo = unknown_albedo(scene, &seen);
     let pixels = seen.len();
     let scale = scene.frame.exposure_scale;
+    let meter = Meter::begin(watcher, Phase::Albedo, ROUNDS as u64 * grid_points(scene));
     for _ in 0..ROUNDS {
-        let light = light_on_surfaces(scene, &seen);
+        let light = light_on_surfaces(scene, &seen, &meter);
         for ((entry, s), (light, ic)) in scene
             .photo_albedo
             .iter_mut()
@@ -62,13 +64,20 @@ pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo) {
         let (of_pixels, of_objects) = scene.photo_albedo.split_at_mut(pixels);
         set_medians(of_pixels, &seen, of_objects);
     }
+    meter.end();
 }
 
 /// log2 of the factor that fits the real radiance to the photograph over the proxy: the median of Ic / Ir in luminance.
-pub fn fit_exposure_ev(scene: &mut PackedScene, photo: &Photo) -> Option<f64> {
+pub fn fit_exposure_ev(
+    scene: &mut PackedScene,
+    photo: &Photo,
+    watcher: &Watcher<'_>,
+) -> Option<f64> {
     let seen = first_surfaces(scene, |_| true);
     scene.photo_albedo = unknown_albedo(scene, &seen);
-    let grid = trace_grid(scene, &seen);
+    let meter = Meter::begin(watcher, Phase::Exposure, grid_points(scene));
+    let grid = trace_grid(scene, &seen, &meter);
+    meter.end();
     let width = scene.frame.width as usize;
     let mut ratios: Vec<f64> = grid
         .points
@@ -151,8 +160,18 @@ struct Grid {
     points: Vec<Option<GridPoint>>,
 }
 
+fn grid_size(scene: &PackedScene) -> (usize, usize) {
+    let points = |pixels: u32| (pixels as usize).div_ceil(GRID_PITCH_PX);
+    (points(scene.frame.width), points(scene.frame.height))
+}
+
+fn grid_points(scene: &PackedScene) -> u64 {
+    let (width, height) = grid_size(scene);
+    width as u64 * height as u64
+}
+
 /// Path traces the real world on the grid, with a pinhole.
-fn trace_grid(scene: &mut PackedScene, seen: &[Seen]) -> Grid {
+fn trace_grid(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) -> Grid {
     let kept = scene.frame;
     scene.frame.aperture_radius = 0.0;
     // Savings left out do not change the estimate, whichever came first.
@@ -161,14 +180,12 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen]) -> Grid {
     scene.frame.rays_total = GRID_RAYS;
     scene.frame.estimator = ESTIMATOR_DIRECT;
     let (frame_width, frame_height) = (kept.width as usize, kept.height as usize);
-    let (width, height) = (
-        frame_width.div_ceil(GRID_PITCH_PX),
-        frame_height.div_ceil(GRID_PITCH_PX),
-    );
+    let (width, height) = grid_size(scene);
     let shared: &PackedScene = scene;
     let points = (0..width * height)
         .into_par_iter()
         .map(|i| {
+            meter.add(1);
             let x = ((i % width) * GRID_PITCH_PX + GRID_PITCH_PX / 2).min(frame_width - 1);
             let y = ((i / width) * GRID_PITCH_PX + GRID_PITCH_PX / 2).min(frame_height - 1);
             let pixel = y * frame_width + x;
@@ -199,8 +216,8 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen]) -> Grid {
 }
 
 /// E / pi of every pixel with a wanted surface: the grid's estimates, weighted by distance, depth and normal.
-fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen]) -> Vec<Vec3> {
-    let grid = trace_grid(scene, seen);
+fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) -> Vec<Vec3> {
+    let grid = trace_grid(scene, seen, meter);
     let width = scene.frame.width as usize;
     seen.par_iter()
         .enumerate()
@@ -367,7 +384,7 @@ mod tests {
         let estimate = |flags: u32| {
             let mut packed = PackedScene::build(&scene).expect("packs");
             packed.frame.flags |= flags;
-            estimate_photo_albedo(&mut packed, &photo);
+            estimate_photo_albedo(&mut packed, &photo, &Watcher::none());
             assert_eq!(packed.frame.flags & flags, flags, "the renders keep theirs");
             let seen: f32 = (0..64)
                 .map(|i| render_first_hit(&packed, 16 * 33, i).0.x)
@@ -384,7 +401,7 @@ mod tests {
     fn each_object_has_the_median_of_its_own_pixels() {
         let (scene, photo) = scene();
         let mut packed = PackedScene::build(&scene).expect("packs");
-        estimate_photo_albedo(&mut packed, &photo);
+        estimate_photo_albedo(&mut packed, &photo, &Watcher::none());
         let of_objects = &packed.photo_albedo[32 * 32..];
         let (red, blue) = ([0.8, 0.2, 0.1], [0.1, 0.2, 0.6]);
         assert_eq!(of_objects.len(), 3);

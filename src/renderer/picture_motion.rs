@@ -23,9 +23,9 @@ impl Renderer {
     pub fn picture_motion(&self, previous: &PreviousView) -> PictureMotion {
         let before = Camera {
             world_from_camera: previous.world_from_camera,
-            ..self.scene.camera.clone()
+            ..self.core.scene.camera.clone()
         };
-        let objects = self.scene.objects.iter().enumerate();
+        let objects = self.core.scene.objects.iter().enumerate();
         let blurs = objects
             .filter(|(_, object)| object.side == Side::Virtual)
             .filter_map(|(index, object)| {
@@ -46,18 +46,21 @@ impl Renderer {
 
     /// Pixel and depth of an object's centre, now and in the frame before.
     fn centres(&self, object: &Object, before: &Camera, time_secs: f64) -> Option<(DVec3, DVec3)> {
-        let now = object.centre_at(self.time_secs)?;
+        let now = object.centre_at(self.core.time_secs)?;
         let then = object.centre_at(time_secs)?;
-        Some((project(&self.scene.camera, now)?, project(before, then)?))
+        Some((
+            project(&self.core.scene.camera, now)?,
+            project(before, then)?,
+        ))
     }
 
     fn objects_of_pixels(&self) -> Vec<u32> {
-        let packed = &self.packed;
+        let packed = &self.core.packed;
         let pinhole = Frame {
             aperture_radius: 0.0,
             ..packed.frame
         };
-        (self.film.pixels.par_iter().enumerate())
+        (self.core.film.pixels.par_iter().enumerate())
             .map(|(pixel, sums)| {
                 if sums.m == 0 {
                     return NONE;

@@ -1,39 +1,19 @@
 //! A row of scrambles: whole renders, each with random numbers of its own, summed.
 
 use std::rc::Rc;
-use std::time::Instant;
 
-use super::tiles::Tiles;
-use super::{Backend, Cancel, ErrorGoal, Pass, Progress, RayTotals, RenderError, Renderer};
+use super::adaptive::ToError;
+use super::core::is_within_reach;
+use super::{RenderError, still};
 use crate::film::Scrambles;
+use crate::gpu::Changed;
 use crate::math::hash_combine;
 use crate::packed::{PIXEL_EDGE, PIXEL_OUT_OF_REACH, PixelInfo};
+use crate::work::{Meter, Phase, Progress, Watcher};
 
-/// Keeps the scrambles' seeds apart from those that a user gives.
+/// Keeps the scrambles' seeds apart from those that a user gives. By chance the number that `cpu/estimator.rs` salts the turns with as well: the
+/// two hash different things, and a new one would be another picture.
 const SEED_SALT: u32 = 0x7f4a_7c15;
-
-/// What a render to an error is told, and where it stands.
-pub(super) struct Run<'a> {
-    pub goal: &'a ErrorGoal,
-    pub cancelled: &'a (dyn Fn() -> bool + Sync),
-    pub progress: &'a mut dyn FnMut(Progress),
-    pub start: Instant,
-    /// Scrambles completed and expected.
-    pub done: u32,
-    pub expected: u32,
-}
-
-impl Run<'_> {
-    fn report(&mut self, rays: RayTotals) {
-        self.done += 1;
-        (self.progress)(Progress {
-            samples: self.done,
-            samples_total: self.expected.max(self.done),
-            rays,
-            elapsed: self.start.elapsed(),
-        });
-    }
-}
 
 /// Scrambles of one plan of samples.
 pub(super) struct Series {
@@ -49,128 +29,135 @@ impl Series {
     }
 }
 
-impl Renderer {
+impl ToError<'_> {
     /// Takes up another plan of samples; known edges stay known.
     pub(super) fn plan(&mut self, mut infos: Vec<PixelInfo>) -> Result<(), RenderError> {
-        for (info, known) in infos.iter_mut().zip(&self.packed.pixels) {
+        let core = &mut *self.core;
+        for (info, known) in infos.iter_mut().zip(&core.packed.pixels) {
             info.flags |= known.flags & PIXEL_EDGE;
         }
-        self.packed.pixels = infos;
-        let factors = self.packed.pixels.iter().map(|info| info.sample_factor);
-        self.film.set_sample_factors(factors);
-        if let Backend::Gpu(gpu) = &mut self.backend {
-            gpu.set_scene(&self.packed)?;
-        }
+        core.packed.pixels = infos;
+        let factors = core.packed.pixels.iter().map(|info| info.sample_factor);
+        core.film.set_sample_factors(factors);
+        core.backend.update(&core.packed, Changed::All)?;
         Ok(())
     }
 
-    /// The first `count` scrambles of the present plan, numbered from `first`, of the tiles in `taking_part`. Fewer if `run` is cancelled.
+    /// The first `count` scrambles of the present plan, numbered from `first`, of the tiles in `taking_part`. Fewer if the watcher ends it.
     pub(super) fn series(
         &mut self,
         first: u32,
         count: u32,
         taking_part: &Rc<[bool]>,
-        tiles: &Tiles,
-        run: &mut Run<'_>,
     ) -> Result<Series, RenderError> {
-        let within_reach =
-            |pixel: &u32| self.packed.pixels[*pixel as usize].flags & PIXEL_OUT_OF_REACH == 0;
-        let active = (0..self.packed.pixels.len() as u32).filter(within_reach);
-        let mode = self.scene.settings.composite;
+        let core = &*self.core;
+        let pixels = &core.packed.pixels;
+        let active = (0..pixels.len()).filter(|&pixel| is_within_reach(&pixels[pixel]));
+        let active = active.map(|pixel| pixel as u32).collect();
         let mut series = Series {
-            sum: Scrambles::new(&self.film, mode, active.collect()),
+            sum: Scrambles::new(&core.film, core.scene.settings.composite, active),
             taken: Vec::new(),
         };
-        if !self.nothing_to_trace() {
+        if !core.nothing_to_trace() {
             let numbers = (first..first + count).map(|number| (number, taking_part.clone()));
-            self.extend(&mut series, numbers, tiles, run)?;
+            self.extend(&mut series, numbers)?;
         }
         Ok(series)
     }
 
-    /// Adds scrambles to a series. False if `run` was cancelled before all were complete.
+    /// Adds scrambles to a series. False if the watcher ended it before all were complete.
     pub(super) fn extend(
         &mut self,
         series: &mut Series,
         numbers: impl Iterator<Item = (u32, Rc<[bool]>)>,
-        tiles: &Tiles,
-        run: &mut Run<'_>,
     ) -> Result<bool, RenderError> {
         let mut complete = true;
+        let watcher = self.watcher;
         for (number, taking_part) in numbers {
-            let takes_part = |pixel: usize| taking_part[tiles.of_pixel(pixel)];
-            if !self.scramble(number, &takes_part, run.cancelled)? {
+            let takes_part = |pixel: usize| taking_part[self.tiles.of_pixel(pixel)];
+            let takes_part: Vec<bool> = (0..self.core.film.pixels.len()).map(takes_part).collect();
+            if !self.scramble(number, &takes_part, &watcher)? {
                 complete = false;
                 break;
             }
-            series.sum.add(&self.film);
+            series.sum.add(&self.core.film);
             series.taken.push((number, taking_part));
-            run.report(self.rays);
+            self.done += 1;
         }
-        self.replay_late_edges(series, tiles)?;
+        watcher.hear(&self.progress());
+        self.replay_late_edges(series)?;
         Ok(complete)
     }
 
-    /// One render with random numbers of its own, left in `self.film`, of the pixels that take part; false if it was cancelled.
+    fn progress(&self) -> Progress {
+        let expected = self.expected.max(self.done);
+        Progress {
+            phase: Phase::Rendering,
+            share_done: f64::from(self.done) / f64::from(expected.max(1)),
+            elapsed: self.begin.elapsed(),
+            samples: self.done,
+            samples_total: expected,
+            rays: self.core.rays,
+        }
+    }
+
+    /// One render with random numbers of its own, left in the film, of the pixels that take part; false if the watcher ended it.
     fn scramble(
         &mut self,
         number: u32,
-        takes_part: &dyn Fn(usize) -> bool,
-        cancelled: &(dyn Fn() -> bool + Sync),
+        takes_part: &[bool],
+        watcher: &Watcher<'_>,
     ) -> Result<bool, RenderError> {
-        let before: Vec<u32> = self.packed.pixels.iter().map(|info| info.flags).collect();
-        for (pixel, info) in self.packed.pixels.iter_mut().enumerate() {
-            if !takes_part(pixel) {
+        let pixels = &mut self.core.packed.pixels;
+        let before: Vec<u32> = pixels.iter().map(|info| info.flags).collect();
+        for (info, takes_part) in pixels.iter_mut().zip(takes_part) {
+            if !takes_part {
                 info.flags |= PIXEL_OUT_OF_REACH;
                 info.flags &= !PIXEL_EDGE;
             }
         }
-        let complete = self.render_scramble(number, cancelled);
-        for (info, flags) in self.packed.pixels.iter_mut().zip(before) {
+        let complete = self.render_scramble(number, watcher);
+        for (info, flags) in self.core.packed.pixels.iter_mut().zip(before) {
             info.flags = flags;
         }
         complete
     }
 
-    fn render_scramble(
-        &mut self,
-        number: u32,
-        cancelled: &(dyn Fn() -> bool + Sync),
-    ) -> Result<bool, RenderError> {
-        self.packed.frame.seed = hash_combine(self.scene.settings.seed ^ SEED_SALT, number);
-        self.send_frame();
-        self.film.clear();
-        let cancel = Cancel::new(cancelled, None);
-        self.run_pass(Pass::Main { end: 1 }, &cancel)?;
-        if cancel.is_cancelled() {
+    fn render_scramble(&mut self, number: u32, watcher: &Watcher<'_>) -> Result<bool, RenderError> {
+        let from = self.progress();
+        let core = &mut *self.core;
+        core.packed.frame.seed = hash_combine(core.scene.settings.seed ^ SEED_SALT, number);
+        core.backend.set_frame(&core.packed);
+        core.film.clear();
+        let work = core.main_work(|_| 1);
+        let share_at_end = f64::from(self.done + 1) / f64::from(self.expected.max(self.done + 1));
+        let meter = Meter::part(watcher, from, share_at_end, work.samples());
+        core.take(&work, &watcher.metered(&meter))?;
+        if watcher.is_cancelled() {
             return Ok(false);
         }
-        self.replay_real()?;
+        still::replay_real(core)?;
         Ok(true)
-    }
-
-    pub(super) fn send_frame(&mut self) {
-        if let Backend::Gpu(gpu) = &mut self.backend {
-            gpu.set_frame(&self.packed);
-        }
     }
 
     /// Pixels that turned out to be edges after a scramble in which they were not lack that scramble's real radiance. They are few: all their
     /// scrambles are rendered again, with it.
-    fn replay_late_edges(&mut self, series: &mut Series, tiles: &Tiles) -> Result<(), RenderError> {
+    fn replay_late_edges(&mut self, series: &mut Series) -> Result<(), RenderError> {
         let film = series.sum.film();
         let is_late: Vec<bool> = (0..film.pixels.len()).map(|i| film.needs_real(i)).collect();
         if !is_late.contains(&true) {
             return Ok(());
         }
         for (pixel, _) in is_late.iter().enumerate().filter(|(_, late)| **late) {
-            self.packed.pixels[pixel].flags |= PIXEL_EDGE;
+            self.core.packed.pixels[pixel].flags |= PIXEL_EDGE;
             series.sum.clear_pixel(pixel);
         }
         for (number, taking_part) in &series.taken {
-            let takes_part = |pixel: usize| is_late[pixel] && taking_part[tiles.of_pixel(pixel)];
-            self.scramble(*number, &takes_part, &|| false)?;
-            series.sum.add(&self.film);
+            let takes_part: Vec<bool> = (is_late.iter().enumerate())
+                .map(|(pixel, late)| *late && taking_part[self.tiles.of_pixel(pixel)])
+                .collect();
+            self.scramble(*number, &takes_part, &Watcher::none())?;
+            series.sum.add(&self.core.film);
         }
         Ok(())
     }

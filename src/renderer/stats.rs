@@ -1,14 +1,14 @@
 //! What a render took, for programs: the record behind `--stats`.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::{RayTotals, Renderer};
+use super::{RayCounts, Renderer};
 use crate::film::PixelCounts;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stats {
     pub seconds: StatsSeconds,
-    pub rays: StatsRays,
+    pub rays: RayCounts,
     pub pixels: PixelCounts,
     pub error: StatsError,
     /// Samples left out because they were not finite.
@@ -48,33 +48,10 @@ pub struct StatsError {
     pub scrambles: u32,
 }
 
-/// Rays traced, by the paper's kinds. Primary rays are among the mixed and real ones too.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StatsRays {
-    pub primary: u64,
-    pub mixed: u64,
-    pub real: u64,
-    pub mixed_shadow: u64,
-    pub real_shadow: u64,
-}
-
-impl From<RayTotals> for StatsRays {
-    fn from(rays: RayTotals) -> Self {
-        Self {
-            primary: rays.primary,
-            mixed: rays.mixed,
-            real: rays.real,
-            mixed_shadow: rays.mixed_shadow,
-            real_shadow: rays.real_shadow,
-        }
-    }
-}
-
 impl Stats {
     /// Of a render whose loading and writing took these times.
     pub fn new(renderer: &Renderer, load_secs: f64, write_secs: f64) -> Self {
         let seconds = renderer.seconds();
-        let rays = renderer.rays();
         Self {
             seconds: StatsSeconds {
                 load: load_secs,
@@ -85,7 +62,7 @@ impl Stats {
                 write: write_secs,
                 cpu: seconds.cpu,
             },
-            rays: rays.into(),
+            rays: renderer.rays(),
             error: StatsError {
                 rms: renderer.error(),
                 from: match renderer.stated() {
@@ -118,7 +95,7 @@ mod tests {
     fn json_has_exactly_the_documented_keys() {
         let stats = Stats {
             seconds: StatsSeconds::default(),
-            rays: StatsRays::default(),
+            rays: RayCounts::default(),
             pixels: PixelCounts::default(),
             error: StatsError::default(),
             non_finite_samples: 0,

@@ -11,6 +11,7 @@ const GREATEST_EXPONENT: f64 = 2.0;
 pub const MARGIN: f64 = 1.1;
 
 /// Squares of [`SIDE`] pixels that cover the picture.
+#[derive(Clone)]
 pub struct Tiles {
     width: usize,
     height: usize,

@@ -1,9 +1,9 @@
 //! `[camera]` and `[lens]`.
 
 use crate::camera::lens::check_distortion;
+use crate::decode::{MAX_PIXELS, MAX_SIDE_PX};
 
 use super::error::Result;
-use super::image_file::{MAX_PIXELS, MAX_SIDE_PX};
 use super::pose::read_camera_pose;
 use super::reader::{Node, Table};
 use super::trajectory::Intrinsics;

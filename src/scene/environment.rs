@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::error::Result;
-use super::image_file::{Pixels, read_image};
 use super::reader::{MAX_RADIANCE, Node, Table};
 use super::srgb::{decode8, decode16};
 use super::{Environment, EnvironmentMap};
+use crate::decode::{Pixels, read_image};
 
 const KEYS: &[&str] = &["image", "radiance", "rotation_deg", "scale"];
 

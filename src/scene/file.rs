@@ -15,6 +15,8 @@ use super::settings::read_settings;
 use super::shutter::{read_camera_motion, read_shutter};
 use super::trajectory::Intrinsics;
 use super::{Photo, Scene, Stages};
+use crate::decode::{MAX_TEXT_BYTES, read_file};
+use crate::files;
 
 const TABLES: &[&str] = &[
     "photo",
@@ -54,9 +56,9 @@ pub fn load(path: &Path) -> std::result::Result<Scene, SceneError> {
 /// # Errors
 /// As [`load`]; or the intrinsics do not fit the photograph.
 pub fn load_with(path: &Path, given: Given) -> std::result::Result<Scene, SceneError> {
-    let bytes = std::fs::read(path).map_err(|error| SceneError::Unreadable {
+    let bytes = read_file(path, MAX_TEXT_BYTES).map_err(|reason| SceneError::Unreadable {
         path: path.to_path_buf(),
-        reason: error.to_string(),
+        reason,
     })?;
     read_scene(&Source::new(path, bytes)?, given)
 }
@@ -87,6 +89,12 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
     lights.extend(mesh_lights);
     let mut inputs = source.files.borrow().clone();
     inputs.extend(mesh_files);
+    for path in &inputs {
+        files::input(path).map_err(|error| SceneError::Unreadable {
+            path: path.clone(),
+            reason: error.to_string(),
+        })?;
+    }
     Ok(Scene {
         name: scene_name(&source.path),
         path: source.path.clone(),

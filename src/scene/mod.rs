@@ -10,7 +10,6 @@ pub(crate) mod error;
 mod file;
 mod fingerprint;
 pub mod gltf;
-mod image_file;
 mod light;
 mod material;
 mod object;

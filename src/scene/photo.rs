@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::error::Result;
-use super::image_file::{ImageFile, Pixels, decode_image, read_image};
 use super::reader::{Node, Table};
 use super::srgb::{decode8, decode16};
 use super::{EncodedPhoto, Exposure, Photo};
+use crate::decode::{ImageFile, Pixels, decode_image, read_image};
 
 const KEYS: &[&str] = &["image", "exposure_ev"];
 
@@ -19,7 +19,10 @@ pub(super) fn read_photo(
         return Ok((given, Exposure::Ev(0.0)));
     };
     let photo = match given {
-        Some(photo) => Some(photo),
+        Some(photo) => {
+            table.optional("image", Node::note_file)?;
+            Some(photo)
+        }
         None => table.optional("image", |node| read_photo_image(node, warnings))?,
     };
     let exposure = table.optional("exposure_ev", |node| read_exposure(node, photo.is_some()))?;

@@ -1,6 +1,5 @@
 //! Where frames come from.
 
-use std::fs::File;
 use std::io::{BufReader, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -8,11 +7,16 @@ use std::path::{Path, PathBuf};
 use super::y4m::{Header, Y4mReader};
 use super::yuv::decode_yuv;
 use super::{Place, VideoError};
+use crate::decode::{read_stream, split_jpegs};
+use crate::files;
 use crate::scene::Photo;
 use crate::scene::trajectory::{FrameName, trailing_number};
 
 /// The frame numbers to render, the end not included.
 pub type FrameRange = Range<u32>;
+
+/// Longest run of JPEG pictures, which is held as a whole.
+const MAX_JPEGS_BYTES: u64 = 8 << 30;
 
 const EXTENSIONS: &[&str] = &["png", "jpg", "jpeg", "exr", "hdr"];
 
@@ -59,6 +63,7 @@ impl FrameSource {
     /// Nothing of the kind is there.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let kind = if path == Path::new("-") {
+            files::standard_input().map_err(|error| Place::Stdin.error(error.to_string()))?;
             let input: Box<dyn Read> = Box::new(BufReader::new(std::io::stdin()));
             Kind::Y4m(Box::new(Y4mReader::new(input, Place::Stdin)?))
         } else if path.is_dir() {
@@ -185,7 +190,8 @@ fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
             format!("it cannot be read ({error}); expected a folder of frames; correct the rights"),
         )
     };
-    let mut files = Vec::new();
+    let mut pictures = Vec::new();
+    files::input(folder).map_err(unreadable)?;
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
         let extension = path.extension().map(|e| e.to_ascii_lowercase());
@@ -196,21 +202,22 @@ fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
             continue;
         };
         if is_picture && !name.starts_with('.') {
-            files.push((name.to_owned(), path));
+            files::input(&path).map_err(unreadable)?;
+            pictures.push((name.to_owned(), path));
         }
     }
-    if files.is_empty() {
+    if pictures.is_empty() {
         return Err(file_error(
             folder,
             "it holds no picture; expected frames as PNG, JPEG, EXR or HDR; name another folder",
         ));
     }
-    files.sort();
-    let numbers: Option<Vec<u32>> = files
+    pictures.sort();
+    let numbers: Option<Vec<u32>> = pictures
         .iter()
         .map(|(name, _)| trailing_number(name))
         .collect();
-    let mut named: Vec<(FrameName, PathBuf)> = files
+    let mut named: Vec<(FrameName, PathBuf)> = pictures
         .into_iter()
         .enumerate()
         .map(|(index, (name, path))| {
@@ -249,49 +256,29 @@ fn open_file(path: &Path) -> Result<Kind, VideoError> {
             ),
         )
     };
-    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
-    let mut start = [0; 2];
-    let read = file.read(&mut start).map_err(unreadable)?;
+    let mut file = BufReader::new(files::open(path).map_err(unreadable)?);
+    let mut start = Vec::new();
+    (&mut file)
+        .take(2)
+        .read_to_end(&mut start)
+        .map_err(unreadable)?;
     if start != [0xff, 0xd8] {
-        let whole: Box<dyn Read> =
-            Box::new(std::io::Cursor::new(start[..read].to_vec()).chain(file));
+        let whole: Box<dyn Read> = Box::new(std::io::Cursor::new(start).chain(file));
         let place = Place::File(path.into());
         return Ok(Kind::Y4m(Box::new(Y4mReader::new(whole, place)?)));
     }
-    let mut bytes = start.to_vec();
-    file.read_to_end(&mut bytes).map_err(unreadable)?;
+    let whole = start.as_slice().chain(file);
+    let bytes = read_stream(whole, MAX_JPEGS_BYTES).map_err(|reason| {
+        file_error(
+            path,
+            format!(
+                "it cannot be read ({reason}); expected a run of JPEG pictures; cut it in parts"
+            ),
+        )
+    })?;
     Ok(Kind::Jpegs {
         frames: split_jpegs(&bytes),
         bytes,
         path: path.into(),
     })
-}
-
-/// Where JPEG pictures begin and end in a run of them. Inside a picture's data ff is never followed by d8 or d9.
-fn split_jpegs(bytes: &[u8]) -> Vec<Range<usize>> {
-    let mut frames = Vec::new();
-    let mut begin = None;
-    let mut at = 0;
-    while at + 1 < bytes.len() {
-        match (bytes[at], bytes[at + 1], begin) {
-            (0xff, 0xd8, None) => begin = Some(at),
-            // Segments may hold anything, a small picture too: their length tells how far to jump.
-            (0xff, 0xc0..=0xcf | 0xda..=0xfe, Some(_)) if at + 3 < bytes.len() => {
-                at += 2 + usize::from(u16::from_be_bytes([bytes[at + 2], bytes[at + 3]]));
-                continue;
-            }
-            (0xff, 0xd9, Some(from)) => {
-                frames.push(from..at + 2);
-                begin = None;
-                at += 1;
-            }
-            _ => {}
-        }
-        at += 1;
-    }
-    if let Some(from) = begin {
-        // Cut off: the decoder says so.
-        frames.push(from..bytes.len());
-    }
-    frames
 }

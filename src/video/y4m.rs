@@ -3,6 +3,7 @@
 use std::io::Read;
 
 use super::{Place, VideoError};
+use crate::decode::{check_size, ensure_memory};
 
 /// How many pixels share a colour sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +26,9 @@ impl Chroma {
         }
     }
 }
+
+/// Of a frame at most: its planes, its codes and its linear light.
+const BYTES_PER_PX: u64 = 18;
 
 /// What a stream says before its first frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -72,7 +76,9 @@ impl Header {
         let (mut width, mut height, mut rate) = (None, None, None);
         let (mut chroma, mut full_range) = (Chroma::C420, false);
         for word in rest.split_ascii_whitespace() {
-            let (key, value) = word.split_at(1);
+            let mut letters = word.chars();
+            let key = letters.next().unwrap_or_default();
+            let value = letters.as_str();
             let side = || match value.parse::<u32>() {
                 Ok(side) if (1..=32768).contains(&side) => Ok(Some(side)),
                 _ => Err(format!(
@@ -80,15 +86,15 @@ impl Header {
                 )),
             };
             match key {
-                "W" => width = side()?,
-                "H" => height = side()?,
-                "F" => rate = parse_rate(value),
-                "I" if !["p", "?"].contains(&value) => {
+                'W' => width = side()?,
+                'H' => height = side()?,
+                'F' => rate = parse_rate(value),
+                'I' if !["p", "?"].contains(&value) => {
                     return Err(format!(
                         "it is interlaced ({word}); expected whole frames; deinterlace it (ffmpeg -vf yadif)"
                     ));
                 }
-                "C" => {
+                'C' => {
                     chroma = match value {
                         "420" | "420jpeg" | "420mpeg2" | "420paldv" => Chroma::C420,
                         "422" => Chroma::C422,
@@ -100,13 +106,15 @@ impl Header {
                         }
                     }
                 }
-                "X" if value == "COLORRANGE=FULL" => full_range = true,
+                'X' if value == "COLORRANGE=FULL" => full_range = true,
                 _ => {}
             }
         }
         let (Some(width), Some(height)) = (width, height) else {
             return Err("its header lacks W or H; expected both; make the stream again".to_owned());
         };
+        check_size(width.into(), height.into())?;
+        ensure_memory((width, height), BYTES_PER_PX)?;
         Ok(Self {
             width,
             height,
@@ -194,7 +202,7 @@ impl<R: Read> Y4mReader<R> {
             )));
         }
         let wanted = self.header.frame_bytes();
-        let mut planes = Vec::new();
+        let mut planes = Vec::with_capacity(wanted);
         let read = (&mut self.input)
             .take(wanted as u64)
             .read_to_end(&mut planes);

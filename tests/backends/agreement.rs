@@ -2,14 +2,16 @@
 
 use std::sync::Arc;
 
-use mixray::cpu::render::render_pass;
+use mixray::cpu::render::render;
 use mixray::film::{Film, composite};
 use mixray::gpu::{GpuBackend, GpuDevice, harness::test_device};
-use mixray::renderer::{Budget, Cancel, Pass, RayTotals, Renderer, RendererOptions, Without};
+use mixray::renderer::{RayCounts, Renderer, RendererOptions, Watcher, Without};
 use mixray::scene::Scene;
+use mixray::work::WorkList;
 
 use super::assets::write_assets;
 use super::scenes::{Case, RAYS};
+use crate::support::largest;
 
 const RELATIVE: f64 = 1e-4;
 const ABSOLUTE: f64 = 1e-5;
@@ -35,7 +37,7 @@ pub fn renderer_without(scene: Scene, all_planes: bool, without: Without) -> Ren
         without,
         ..RendererOptions::default()
     };
-    Renderer::new(scene, options).unwrap_or_else(|error| panic!("{error}"))
+    Renderer::new(scene, options, &Watcher::none()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// What a pixel shows, plane by plane: the composite, the means, the guides.
@@ -86,12 +88,10 @@ impl Difference {
                 .map(|pixel| film[pixel][plane])
                 .sum()
         };
-        let average = (0..a[0].len())
-            .map(|plane| {
-                let (x, y) = (sum(a, plane), sum(b, plane));
-                (x - y).abs() / x.abs().max(ABSOLUTE * a.len() as f64)
-            })
-            .fold(0.0, f64::max);
+        let average = largest((0..a[0].len()).map(|plane| {
+            let (x, y) = (sum(a, plane), sum(b, plane));
+            (x - y) / x.abs().max(ABSOLUTE * a.len() as f64)
+        }));
         Self {
             outliers,
             pixels: a.len(),
@@ -104,17 +104,32 @@ impl Difference {
     }
 }
 
-/// The passes of a complete render: every pixel's samples, and its real rays everywhere.
-const PASSES: [Pass; 2] = [Pass::Main { end: RAYS }, Pass::Real { everywhere: true }];
+/// What a complete render takes: every pixel's samples up to `end`, and its real rays everywhere.
+pub fn render_all(
+    renderer: &Renderer,
+    film: &mut Film,
+    end: u32,
+    mut render: impl FnMut(&mut Film, &WorkList),
+) {
+    let infos = &renderer.packed().pixels;
+    let main = WorkList::main(infos, film, |_| end);
+    render(film, &main);
+    let real = WorkList::real(infos, film, true, |_| end);
+    render(film, &real);
+}
+
+pub fn empty_film(renderer: &Renderer, first: u32, all_planes: bool) -> Film {
+    let frame = &renderer.packed().frame;
+    Film::new(frame.width, frame.height, first, all_planes)
+}
 
 /// The film of the CPU, and its rays.
-pub fn cpu_film(renderer: &Renderer, all_planes: bool) -> (Film, RayTotals) {
-    let scene = renderer.packed();
-    let mut film = Film::new(scene.frame.width, scene.frame.height, 0, all_planes);
-    let mut rays = RayTotals::default();
-    for pass in PASSES {
-        rays += render_pass(scene, &mut film, pass, &Cancel::new(&|| false, None));
-    }
+pub fn cpu_film(renderer: &Renderer, all_planes: bool) -> (Film, RayCounts) {
+    let mut film = empty_film(renderer, 0, all_planes);
+    let mut rays = RayCounts::default();
+    render_all(renderer, &mut film, RAYS, |film, work| {
+        rays += render(renderer.packed(), film, work, &Watcher::none());
+    });
     (film, rays)
 }
 
@@ -123,22 +138,19 @@ pub fn gpu_film(
     backend: &mut GpuBackend,
     renderer: &Renderer,
     all_planes: bool,
-) -> (Film, RayTotals) {
-    let scene = renderer.packed();
-    let mut film = Film::new(scene.frame.width, scene.frame.height, 0, all_planes);
-    let mut rays = RayTotals::default();
-    for pass in PASSES {
-        backend
-            .render_pass(
-                scene,
-                &mut film,
-                pass,
-                &Cancel::new(&|| false, None),
-                &mut rays,
-            )
-            .unwrap_or_else(|error| panic!("{error}"));
-    }
+) -> (Film, RayCounts) {
+    let mut film = empty_film(renderer, 0, all_planes);
+    let mut rays = RayCounts::default();
+    render_all(renderer, &mut film, RAYS, |film, work| {
+        render_on(backend, film, work, &mut rays);
+    });
     (film, rays)
+}
+
+pub fn render_on(backend: &mut GpuBackend, film: &mut Film, work: &WorkList, rays: &mut RayCounts) {
+    backend
+        .render(film, work, rays, &Watcher::none())
+        .unwrap_or_else(|error| panic!("{error}"));
 }
 
 pub fn backend_for(gpu: &Arc<GpuDevice>, renderer: &Renderer) -> GpuBackend {
@@ -160,7 +172,7 @@ pub fn assert_scene_agrees(
     scene: &Scene,
     all_planes: bool,
     without: Without,
-) -> RayTotals {
+) -> RayCounts {
     let built = renderer_without(scene.clone(), all_planes, without);
     let (film, cpu_rays) = cpu_film(&built, all_planes);
     let expected = planes(&built, &film);
@@ -226,18 +238,14 @@ fn assert_flipped(name: &str, backend: &mut GpuBackend, renderer: &Renderer, pix
     let scene = renderer.packed();
     let mut flipped = Vec::new();
     for index in 0..RAYS {
-        let empty = Film::new(scene.frame.width, scene.frame.height, index, false);
+        let empty = empty_film(renderer, index, false);
         let [mut on_cpu, mut on_gpu] = [empty.clone(), empty];
-        let (mut gpu_rays, cancel) = (RayTotals::default(), Cancel::new(&|| false, None));
-        for pass in [
-            Pass::Main { end: index + 1 },
-            Pass::Real { everywhere: true },
-        ] {
-            render_pass(scene, &mut on_cpu, pass, &cancel);
-            backend
-                .render_pass(scene, &mut on_gpu, pass, &cancel, &mut gpu_rays)
-                .unwrap_or_else(|error| panic!("{error}"));
-        }
+        render_all(renderer, &mut on_cpu, index + 1, |film, work| {
+            render(scene, film, work, &Watcher::none());
+        });
+        render_all(renderer, &mut on_gpu, index + 1, |film, work| {
+            render_on(backend, film, work, &mut RayCounts::default());
+        });
         let (a, b) = (planes(renderer, &on_cpu), planes(renderer, &on_gpu));
         if Difference::between(&a[pixel..=pixel], &b[pixel..=pixel])
             .outliers
@@ -260,11 +268,4 @@ fn assert_flipped(name: &str, backend: &mut GpuBackend, renderer: &Renderer, pix
         flipped.len() as u32 <= RAYS / 2,
         "{name}: pixel {pixel} differs in samples {flipped:?}"
     );
-}
-
-/// A complete render through the public renderer.
-pub fn complete(renderer: &mut Renderer) {
-    renderer
-        .advance(Budget::Complete, &|| false, &mut |_| ())
-        .unwrap_or_else(|error| panic!("{error}"));
 }

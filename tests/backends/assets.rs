@@ -1,7 +1,7 @@
 //! Files that the scenes of the table name: textures, meshes that wear them, an environment map, a photograph.
 
 use std::f32::consts::TAU;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::{Value, json};
 
@@ -49,18 +49,6 @@ pub fn write_assets(folder: &Path) {
         let file = serde_json::to_vec(&sheet(&material)).expect("serialises");
         std::fs::write(folder.join(name), file).expect("writes");
     }
-}
-
-/// A folder of the shared data; None, said aloud, where the data is not there.
-pub fn shared_data(folder: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data")
-        .join(folder);
-    if path.is_dir() {
-        return Some(path);
-    }
-    eprintln!("SKIPPED: {} is not there", path.display());
-    None
 }
 
 /// Colour, metallic-roughness and normal maps, shifted, turned and scaled.

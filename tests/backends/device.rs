@@ -4,31 +4,29 @@ use std::sync::Arc;
 
 use mixray::film::Film;
 use mixray::gpu::{AdapterChoice, GpuBackend, GpuDevice, GpuError, harness::test_device};
-use mixray::renderer::{Budget, Cancel, Pass, RayTotals, Renderer};
+use mixray::renderer::{Budget, RayCounts, Renderer, Watcher};
 use mixray::scene::BackendChoice;
+use mixray::work::WorkList;
 
 use super::agreement::{
-    Difference, backend_for, complete, cpu_film, gpu_film, load, planes, renderer,
+    Difference, backend_for, cpu_film, empty_film, gpu_film, load, planes, render_all, render_on,
+    renderer,
 };
 use super::scenes::{RAYS, case};
+use crate::support::complete;
 
 /// The same samples in other portions.
-fn in_portions(backend: &mut GpuBackend, renderer: &Renderer, ends: &[u32]) -> (Film, RayTotals) {
-    let scene = renderer.packed();
-    let mut film = Film::new(scene.frame.width, scene.frame.height, 0, true);
-    let mut rays = RayTotals::default();
-    let passes = ends.iter().map(|&end| Pass::Main { end });
-    for pass in passes.chain([Pass::Real { everywhere: true }]) {
-        backend
-            .render_pass(
-                scene,
-                &mut film,
-                pass,
-                &Cancel::new(&|| false, None),
-                &mut rays,
-            )
-            .unwrap_or_else(|error| panic!("{error}"));
+fn in_portions(backend: &mut GpuBackend, renderer: &Renderer, ends: &[u32]) -> (Film, RayCounts) {
+    let mut film = empty_film(renderer, 0, true);
+    let mut rays = RayCounts::default();
+    let (last, ends) = ends.split_last().expect("portions");
+    for &end in ends {
+        let work = WorkList::main(&renderer.packed().pixels, &film, |_| end);
+        render_on(backend, &mut film, &work, &mut rays);
     }
+    render_all(renderer, &mut film, *last, |film, work| {
+        render_on(backend, film, work, &mut rays);
+    });
     (film, rays)
 }
 
@@ -62,7 +60,7 @@ fn a_lost_device_is_replaced_by_the_cpu_with_what_was_accumulated() {
     let mut losing = renderer(scene, true);
     assert_eq!(losing.backend_name(), "gpu");
     losing
-        .advance(Budget::Rays(1), &|| false, &mut |_| ())
+        .advance(Budget::Rays(1), &Watcher::none())
         .expect("renders");
     assert_eq!(losing.samples(), 1);
     let before = losing.film().clone();

@@ -6,15 +6,16 @@ mod device;
 mod scenes;
 
 use mixray::gpu::{Features, GpuBackend, harness::test_device};
-use mixray::renderer::{ErrorGoal, Renderer, Skip, Without};
+use mixray::renderer::{ErrorGoal, Renderer, Skip, Watcher, Without};
 use mixray::scene::BackendChoice;
 
 use agreement::{
     Difference, assert_agreement, assert_scene_agrees, backend_for, gpu_film, load, planes,
     renderer,
 };
-use assets::shared_data;
 use scenes::{CASES, Case, case};
+
+use crate::support::shared_data;
 
 macro_rules! each_case {
     ($($name:ident,)*) => {
@@ -124,7 +125,7 @@ fn adaptive_renders() {
             noise: None,
             max_rays_per_pixel: 1024,
         };
-        (renderer.render_to_error(&goal, &|| false, &mut |_| ())).expect("it renders");
+        (renderer.render_to_error(&goal, &Watcher::none())).expect("it renders");
         renderer
     };
     let goal = 0.002;

@@ -3,7 +3,7 @@
 use mixray::renderer::Skip;
 use mixray::scene::Choice;
 
-use super::support::{Folder, QUICK};
+use super::support::{QUICK, folder};
 
 /// The quick benchmark as this subcommand.
 fn of(subcommand: &str) -> String {
@@ -12,7 +12,7 @@ fn of(subcommand: &str) -> String {
 
 #[test]
 fn each_saving_has_its_rows() {
-    let folder = Folder::new();
+    let folder = folder();
     let shown = folder.succeed(&format!("{} --goal-rpp 64", of("ablate")));
     let report = folder.json("out/results.json");
     let rows = report["rows"].as_array().unwrap();
@@ -59,7 +59,7 @@ fn each_saving_has_its_rows() {
 
 #[test]
 fn savings_and_goals_have_rows_by_name() {
-    let folder = Folder::new();
+    let folder = folder();
     folder.succeed(&format!(
         "{QUICK} --estimators direct --no-skip cones --no-skip cones --target-error 0.5 --camera-noise 0.5,20 --goal-rpp 16"
     ));
@@ -86,7 +86,7 @@ fn savings_and_goals_have_rows_by_name() {
 
 #[test]
 fn flags_that_would_do_nothing_are_refused() {
-    let folder = Folder::new();
+    let folder = folder();
     for flag in [
         "--no-skip cones",
         "--no-skip specialisation",

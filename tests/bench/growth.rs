@@ -1,10 +1,10 @@
 //! `mixray bench growth`.
 
-use super::support::Folder;
+use super::support::folder;
 
 #[test]
 fn growth_has_a_curve_a_law_and_method() {
-    let folder = Folder::new();
+    let folder = folder();
     folder.write("page.md", "a\n<!-- growth -->\n<!-- end -->\nb\n");
     let table = folder.succeed(
         "bench growth rays,objects --shrink 16 --repeats 1 --backends cpu -o out --write-docs page.md",

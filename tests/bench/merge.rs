@@ -5,7 +5,8 @@ use std::path::Path;
 
 use mixray::output::ChannelFile;
 
-use super::support::{Folder, SCENE};
+use super::support::{SCENE, folder};
+use crate::support::Folder;
 
 /// Renders ranges of `total` rays into part-0.exr and so on.
 fn render_parts(folder: &Folder, flags: &str, total: u32, ranges: &[(u32, u32)]) {
@@ -46,7 +47,7 @@ fn ranges_merged_equal_one_run() {
         "--sampler cmj --no-skip plan",
         "--no-skip cones --no-skip edge-real",
     ] {
-        let folder = Folder::new();
+        let folder = folder();
         render_parts(&folder, flags, 16, &[(0, 3), (3, 8), (8, 16)]);
         folder.succeed(&format!(
             "render scene.toml {flags} --rpp 16 -o whole.exr -o whole.png"
@@ -80,7 +81,7 @@ fn ranges_merged_equal_one_run() {
 
 #[test]
 fn ranges_of_a_scene_without_virtual_things_merge_too() {
-    let folder = Folder::new();
+    let folder = folder();
     let nothing_virtual = SCENE.split("[[virtual]]").next().unwrap();
     folder.write("scene.toml", nothing_virtual);
     for (first, end) in [(0, 3), (3, 8), (8, 16)] {
@@ -96,7 +97,7 @@ fn ranges_of_a_scene_without_virtual_things_merge_too() {
 
 #[test]
 fn films_that_do_not_fit_are_refused() {
-    let folder = Folder::new();
+    let folder = folder();
     render_parts(&folder, "", 16, &[(0, 4), (4, 8), (3, 8), (5, 8)]);
     let merge = |other: &str| format!("merge part-0.exr {other} -o merged.exr");
     folder.refuse(&merge("part-2.exr"), "overlap");

@@ -1,12 +1,11 @@
 //! Rows of error against time, their reference, their page, and the comparison with earlier ones.
 
-use std::process::Command;
-
-use super::support::{Folder, QUICK, SCENE};
+use super::support::{QUICK, SCENE, folder};
+use crate::support::interrupt;
 
 #[test]
 fn a_benchmark_writes_its_figures_plots_and_page() {
-    let folder = Folder::new();
+    let folder = folder();
     folder.write(
         "page.md",
         "before\n<!-- bench -->\nold\n<!-- end -->\nafter\n",
@@ -65,7 +64,7 @@ fn a_benchmark_writes_its_figures_plots_and_page() {
     let docs = folder.read("page.md");
     assert!(docs.starts_with("before") && docs.ends_with("after\n") && !docs.contains("old"));
     assert!(docs.contains("    mixray bench scene.toml"));
-    let name = folder.0.path().file_name().unwrap().to_string_lossy();
+    let name = folder.name();
     for axis in ["time", "rays"] {
         for extension in ["svg", "png"] {
             let plot = format!("out/{name}-error-{axis}.{extension}");
@@ -76,7 +75,7 @@ fn a_benchmark_writes_its_figures_plots_and_page() {
 
 #[test]
 fn a_changed_scene_gets_a_new_reference() {
-    let folder = Folder::new();
+    let folder = folder();
     let source = || {
         folder.succeed(QUICK);
         let report = folder.json("out/results.json");
@@ -101,7 +100,7 @@ fn a_changed_scene_gets_a_new_reference() {
 
 #[test]
 fn references_from_outside_are_used_if_they_fit() {
-    let folder = Folder::new();
+    let folder = folder();
     folder.succeed("render scene.toml -o ref.png --rpp 64");
     folder.succeed(&format!("{QUICK} --reference ref.png"));
     let report = folder.json("out/results.json");
@@ -126,7 +125,7 @@ fn references_from_outside_are_used_if_they_fit() {
 
 #[test]
 fn a_regression_exits_with_1() {
-    let folder = Folder::new();
+    let folder = folder();
     folder.succeed(QUICK);
     let itself = "bench --report out/results.json --against out/results.json";
     let shown = folder.succeed(itself);
@@ -161,37 +160,20 @@ fn a_regression_exits_with_1() {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_benchmark_keeps_what_is_finished() {
-    use std::time::{Duration, Instant};
-
-    let folder = Folder::new();
+    let folder = folder();
     // The first run leaves the reference, so that the second measures at once.
     folder.succeed(QUICK);
-    std::fs::remove_file(folder.path("out/results.json")).unwrap();
+    folder.remove("out/results.json");
     let endless =
         "bench scene.toml --backends cpu --rpp 1,4 --repeats 1000 --reference-error 0.5 -o out";
     for wait_ms in [1_000, 4_000, 16_000] {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_mixray"))
-            .current_dir(folder.0.path())
-            .args(endless.split_whitespace())
+        let mut child = folder
+            .command(endless)
             .stdout(std::process::Stdio::null())
             .spawn()
             .unwrap();
-        std::thread::sleep(Duration::from_millis(wait_ms));
-        let kill = Command::new("kill")
-            .args(["-INT", &child.id().to_string()])
-            .status();
-        assert!(kill.unwrap().success());
-        let start = Instant::now();
-        let status = loop {
-            if let Some(status) = child.try_wait().unwrap() {
-                break status;
-            }
-            if start.elapsed() > Duration::from_secs(30) {
-                child.kill().unwrap();
-                panic!("did not end");
-            }
-            std::thread::sleep(Duration::from_millis(20));
-        };
+        std::thread::sleep(std::time::Duration::from_millis(wait_ms));
+        let status = interrupt(&mut child);
         if !folder.path("out/results.json").exists() {
             // A busy machine: nothing was measured yet.
             continue;
@@ -211,7 +193,7 @@ fn an_interrupted_benchmark_keeps_what_is_finished() {
 
 #[test]
 fn the_papers_table_has_a_row_a_count_of_rays() {
-    let folder = Folder::new();
+    let folder = folder();
     let shown = folder.succeed("bench paper-table --backends cpu --repeats 1 --shrink 24 -o out");
     let table = folder.json("out/paper.json");
     let rows = table["rows"].as_array().unwrap();

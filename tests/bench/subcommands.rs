@@ -1,11 +1,11 @@
 //! Which measurement takes which flags, and what the measurements were called when they were flags.
 
-use super::support::Folder;
+use super::support::folder;
 
 /// What each takes beside its own, and what it has no use for.
 #[test]
 fn each_measurement_refuses_the_flags_of_others() {
-    let folder = Folder::new();
+    let folder = folder();
     let of_rows = "--goal-rpp 64,--reference-error 1,--reference-rpp 64,--filter,--against r.json";
     for (measurement, others) in [
         ("growth", "--rpp 4"),
@@ -26,7 +26,7 @@ fn each_measurement_refuses_the_flags_of_others() {
 
 #[test]
 fn the_flags_of_before_name_the_subcommand() {
-    let folder = Folder::new();
+    let folder = folder();
     for (before, now) in [
         ("scene.toml --ablate", "`mixray bench ablate SCENE...`"),
         ("--growth", "`mixray bench growth [WHAT,...]`"),
@@ -49,7 +49,7 @@ fn the_flags_of_before_name_the_subcommand() {
 
 #[test]
 fn gpu_time_has_a_row_a_count_of_rays() {
-    let folder = Folder::new();
+    let folder = folder();
     folder.write("page.md", "<!-- gpu-time -->\n<!-- end -->\n");
     let shown = folder.succeed("bench gpu-time scene.toml --rpp 4,1,4 -o out --write-docs page.md");
     let times = &folder.json("out/gpu-time.json")["times"];
@@ -69,7 +69,7 @@ fn gpu_time_has_a_row_a_count_of_rays() {
 /// All of it takes minutes: a figure into a page that lacks the place ends before it begins.
 #[test]
 fn stress_wants_a_page_with_its_section() {
-    let folder = Folder::new();
+    let folder = folder();
     folder.write("page.md", "<!-- bench -->\n<!-- end -->\n");
     folder.refuse(
         "bench stress --write-docs page.md -o out",

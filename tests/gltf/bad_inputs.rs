@@ -7,7 +7,8 @@ use std::time::Duration;
 use mixray::scene::gltf::{GltfError, GltfScene, Problem, load_gltf};
 use serde_json::{Value, json};
 
-use super::{check_scene, gltf_files, shared_data};
+use super::check_scene;
+use crate::support::{gltf_files, shared_data};
 
 /// Loads on a thread of its own, so that a panic or a hang becomes a test failure that names the file.
 pub fn load_guarded(path: &Path) -> Result<GltfScene, GltfError> {

@@ -3,31 +3,14 @@
 use serde_json::{Value, json};
 
 use super::bad_inputs::{check_outcome, load_guarded};
-use super::shared_data;
-
-/// Deterministic noise for the mutations (splitmix64).
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, bound: usize) -> usize {
-        (self.next() % bound as u64) as usize
-    }
-}
+use crate::support::{Random, shared_data};
 
 fn json_end(glb: &[u8]) -> usize {
     20 + u32::from_le_bytes([glb[12], glb[13], glb[14], glb[15]]) as usize
 }
 
 /// Up to four bytes, digits of the JSON half of the time: there the counts, offsets and indices stand.
-fn with_other_bytes(glb: &[u8], noise: &mut Noise) -> Vec<u8> {
+fn with_other_bytes(glb: &[u8], noise: &mut Random) -> Vec<u8> {
     let mut bytes = glb.to_vec();
     let anywhere = noise.below(2) == 0;
     for _ in 0..=noise.below(4) {
@@ -39,7 +22,7 @@ fn with_other_bytes(glb: &[u8], noise: &mut Noise) -> Vec<u8> {
         if bytes[at].is_ascii_digit() {
             bytes[at] = b'0' + noise.below(10) as u8;
         } else if anywhere {
-            bytes[at] = noise.next() as u8;
+            bytes[at] = noise.bits() as u8;
         }
     }
     if noise.below(50) == 0 {
@@ -70,7 +53,7 @@ fn at<'v>(value: &'v mut Value, index: &mut usize) -> Option<&'v mut Value> {
 }
 
 /// One value of the JSON replaced, scaled, or robbed of a part: still well-formed, so that the damage reaches what interprets it.
-fn with_another_value(glb: &[u8], noise: &mut Noise) -> Vec<u8> {
+fn with_another_value(glb: &[u8], noise: &mut Random) -> Vec<u8> {
     let odd = json!([
         null,
         -1,
@@ -148,11 +131,11 @@ fn damaged_files_never_panic() {
     for (kind, damage) in [
         (
             "bytes",
-            with_other_bytes as fn(&[u8], &mut Noise) -> Vec<u8>,
+            with_other_bytes as fn(&[u8], &mut Random) -> Vec<u8>,
         ),
         ("values", with_another_value),
     ] {
-        let mut noise = Noise(1);
+        let mut noise = Random(1);
         let (mut loaded, mut refused) = (0, 0);
         for name in ["BoxInterleaved.glb", "BoxTextured.glb", "box_sparse.glb"] {
             let whole = std::fs::read(root.join(name)).unwrap();

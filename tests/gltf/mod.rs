@@ -5,44 +5,9 @@ mod damaged;
 mod models;
 mod synthetic;
 
-use std::path::{Path, PathBuf};
-
 use glam::{DVec3, Vec3};
 use mixray::scene::gltf::GltfScene;
 use mixray::scene::{Material, Primitive, TextureRef};
-
-/// A folder of the shared data; None, said aloud, where the data is not there.
-fn shared_data(folder: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data")
-        .join(folder);
-    if path.is_dir() {
-        return Some(path);
-    }
-    eprintln!("SKIPPED: {} is not there", path.display());
-    None
-}
-
-/// Every .gltf and .glb under `folder`, sorted.
-fn gltf_files(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path
-                .extension()
-                .is_some_and(|ending| ending == "gltf" || ending == "glb")
-            {
-                files.push(path);
-            }
-        }
-    }
-    files.sort();
-    files
-}
 
 /// What the rest of mixray relies on in whatever was loaded.
 fn check_scene(scene: &GltfScene) -> Result<(), String> {

@@ -8,7 +8,8 @@ use mixray::scene::gltf::{GltfScene, load_gltf};
 use mixray::scene::{AlphaMode, Material, Wrap};
 use serde_json::Value;
 
-use super::{check_scene, corners, gltf_files, shared_data, textures};
+use super::{check_scene, corners, textures};
+use crate::support::{gltf_files, shared_data};
 
 fn model(name: &str) -> Option<GltfScene> {
     let root = shared_data("gltf_models")?;

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::reference::{picture, rms};
 use super::*;
+use crate::support::Folder;
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -16,13 +17,8 @@ enum Outcome {
     Picture,
 }
 
-fn run(scene: &Path, out: &Path) -> Result<Output, String> {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_mixray"))
-        .arg("render")
-        .arg(scene)
-        .arg("-o")
-        .arg(out)
-        .args(["--rpp", "1", "--threads", "1"])
+fn run(mut command: Command) -> Result<Output, String> {
+    let mut child = command
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -85,7 +81,7 @@ fn small_scene(model: &Path) -> String {
 /// (refused, rendered) of the files of a folder.
 fn run_all(folder: &str) -> Option<(usize, usize)> {
     let files = gltf_files(&shared_data(folder)?);
-    let temporary = tempfile::tempdir().unwrap();
+    let temporary = Folder::new();
     let next = Mutex::new(files.iter().enumerate());
     let found = Mutex::new((0, 0));
     let work = || {
@@ -93,10 +89,12 @@ fn run_all(folder: &str) -> Option<(usize, usize)> {
             let Some((number, model)) = next.lock().unwrap().next() else {
                 return;
             };
-            let scene = temporary.path().join(format!("{number}.toml"));
-            let out = temporary.path().join(format!("{number}.png"));
-            std::fs::write(&scene, small_scene(model)).unwrap();
-            let outcome = run(&scene, &out).and_then(|output| judge(model, &output, &out));
+            let (scene, picture) = (format!("{number}.toml"), format!("{number}.png"));
+            temporary.write(&scene, small_scene(model));
+            let command =
+                temporary.command(&format!("render {scene} -o {picture} --rpp 1 --threads 1"));
+            let out = temporary.path(&picture);
+            let outcome = run(command).and_then(|output| judge(model, &output, &out));
             match outcome {
                 Ok(Outcome::Refused) => found.lock().unwrap().0 += 1,
                 Ok(Outcome::Picture) => found.lock().unwrap().1 += 1,
@@ -132,8 +130,8 @@ fn every_compressed_file_is_refused_in_one_line() {
 /// Negative control: the judge knows what it should not let pass.
 #[test]
 fn the_judge_notices_bad_endings() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("out.png");
+    let folder = Folder::new();
+    let out = folder.path("out.png");
     let ending = |script: &str| {
         let output = Command::new("sh").args(["-c", script]).output().unwrap();
         judge(Path::new("a.gltf"), &output, &out)
@@ -164,11 +162,8 @@ fn a_box_with_bad_normals_is_a_correct_picture() {
     let Some(root) = shared_data("gltf_bad_inputs") else {
         return;
     };
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("scene.toml");
     let path = root.join("assimp_BoxBadNormals/BoxBadNormals.glb");
-    std::fs::write(&file, scene_text(&path, WHITE_SKY)).unwrap();
-    let mut scene = load(&file).unwrap();
+    let mut scene = crate::support::scene(&scene_text(&path, WHITE_SKY));
     frame(&mut scene, [0.55, 0.35, 1.0]);
     repaint(&mut scene, grey);
     let expected = picture(&scene, |_, _| DVec3::splat(0.8));

@@ -6,45 +6,14 @@ mod materials;
 mod reference;
 mod silhouettes;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::{DMat4, DVec3};
 use mixray::film::Picture;
-use mixray::renderer::{Budget, Renderer, RendererOptions};
-use mixray::scene::{AlphaMode, Instance, Material, Scene, load};
+use mixray::renderer::{Renderer, RendererOptions, Watcher};
+use mixray::scene::{AlphaMode, Instance, Material, Scene};
 
-/// A folder of the shared data; None, said aloud, where the data is not there.
-fn shared_data(folder: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data")
-        .join(folder);
-    if path.is_dir() {
-        return path.canonicalize().ok();
-    }
-    eprintln!("SKIPPED: {} is not there", path.display());
-    None
-}
-
-/// Every .gltf and .glb under `folder`, sorted.
-fn gltf_files(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path
-                .extension()
-                .is_some_and(|ending| ending == "gltf" || ending == "glb")
-            {
-                files.push(path);
-            }
-        }
-    }
-    files.sort();
-    files
-}
+use crate::support::{complete, gltf_files, mask, shared_data};
 
 const WIDTH: u32 = 64;
 const HEIGHT: u32 = 48;
@@ -64,10 +33,7 @@ fn scene_text(model: &Path, light: &str) -> String {
 /// A sample model under some light, seen from the default camera; None where the data is not there.
 fn model(name: &str, light: &str) -> Option<Scene> {
     let path = shared_data("gltf_models")?.join(name);
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("scene.toml");
-    std::fs::write(&file, scene_text(&path, light)).unwrap();
-    Some(load(&file).unwrap_or_else(|error| panic!("{error}")))
+    Some(crate::support::scene(&scene_text(&path, light)))
 }
 
 fn is_drawn(scene: &Scene) -> bool {
@@ -168,19 +134,11 @@ struct Shot {
 }
 
 fn shoot(scene: Scene) -> Shot {
-    let mut renderer = Renderer::new(scene, RendererOptions::default()).unwrap();
-    renderer
-        .advance(Budget::Complete, &|| false, &mut |_| ())
-        .unwrap();
-    let film = renderer.film();
-    assert_eq!(film.non_finite_samples(), 0);
+    let mut renderer = Renderer::new(scene, RendererOptions::default(), &Watcher::none()).unwrap();
+    complete(&mut renderer);
     let picture = renderer.picture();
     assert!(picture.linear.as_flattened().iter().all(|x| x.is_finite()));
-    let mask = film
-        .pixels
-        .iter()
-        .map(|p| f64::from(p.m) / f64::from(p.n.max(1)))
-        .collect();
+    let mask = mask(renderer.film());
     Shot { picture, mask }
 }
 

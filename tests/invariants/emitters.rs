@@ -131,7 +131,7 @@ side = "virtual"
     }
 }
 
-on_each_backend!(
+on_the_cpu!(
     opacity_scales_emission,
     lamps_of_both_worlds_light_far_things_alike,
     unlit_surfaces_emit_their_base_colour_alone,

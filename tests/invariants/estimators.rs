@@ -341,7 +341,7 @@ fn control_notices_an_albedo(backend: BackendChoice) {
     assert!(!difference.is_none(), "{difference}");
 }
 
-on_each_backend!(
+on_the_cpu!(
     diffuse_under_a_quad,
     glossy_table,
     coated_table,

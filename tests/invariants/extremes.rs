@@ -320,7 +320,7 @@ fn glass_on_a_table_keeps_the_energy(backend: BackendChoice) {
     }
 }
 
-on_each_backend!(
+on_the_cpu!(
     scale_and_place_do_not_matter,
     slivers_lose_nothing,
     grazing_views_keep_the_energy,

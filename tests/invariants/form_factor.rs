@@ -115,4 +115,4 @@ fn a_black_sphere_takes_its_form_factor(backend: BackendChoice) {
     );
 }
 
-on_each_backend!(a_black_sphere_takes_its_form_factor);
+on_the_cpu!(a_black_sphere_takes_its_form_factor);

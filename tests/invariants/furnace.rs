@@ -200,7 +200,7 @@ fn rough_surfaces_show_their_single_scattering_albedo(backend: BackendChoice) {
     );
 }
 
-on_each_backend!(
+on_the_cpu!(
     smooth_white_objects_vanish,
     white_lambertian_objects_vanish,
     rough_surfaces_show_their_single_scattering_albedo,

@@ -208,7 +208,7 @@ fn bokeh_has_the_shape_of_the_aperture(backend: BackendChoice) {
     }
 }
 
-on_each_backend!(
+on_the_cpu!(
     aperture_0_is_the_pinhole,
     blur_is_the_circle_of_confusion,
     bokeh_has_the_shape_of_the_aperture,

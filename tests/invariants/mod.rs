@@ -1,5 +1,5 @@
-//! The invariants of the design: what every picture must keep, whatever the scene and the backend. Each check is a function of the backend
-//! and each has a control that shows it can fail.
+//! The invariants of the design: what every picture must keep, whatever the scene. Each check is a function of the backend, runs on the
+//! CPU, and has a control that shows it can fail.
 
 mod emitters;
 mod estimators;

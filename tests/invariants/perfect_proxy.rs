@@ -122,7 +122,7 @@ fn every_kind_of_pixel_is_there(backend: BackendChoice) {
     );
 }
 
-on_each_backend!(
+on_the_cpu!(
     composites_converge_to_the_mixed_picture,
     every_kind_of_pixel_is_there,
 );

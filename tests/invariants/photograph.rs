@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use mixray::output::{PngBits, Target, write_png};
-use mixray::renderer::{RayTotals, Renderer};
+use mixray::renderer::{RayCounts, Renderer};
 use mixray::scene::{BackendChoice, Photo, Scene};
 
 use super::support::*;
@@ -64,7 +64,7 @@ fn without_virtual_things_the_photograph_comes_back(backend: BackendChoice) {
         let path = folder.path().join("out.png");
 
         let untouched = render(&scene(&text), backend);
-        assert_eq!(untouched.rays(), RayTotals::default());
+        assert_eq!(untouched.rays(), RayCounts::default());
         assert!(written(&untouched, &path, png_bits) == original);
 
         let ball = "[[virtual]]\nshape = \"sphere\"\nsegments = 8\nscale = 0.1\ntranslation = [0, 0.1, 0]\n";
@@ -211,7 +211,7 @@ fn lit_pixels_outside_the_shadow_are_the_photograph(backend: BackendChoice) {
     assert!(inside > 15 && outside > 300, "control: there are both");
 }
 
-on_each_backend!(
+on_the_cpu!(
     without_virtual_things_the_photograph_comes_back,
     pixels_off_the_proxy_are_the_photograph,
     lit_pixels_outside_the_shadow_are_the_photograph,

@@ -1,6 +1,6 @@
 //! Invariant 8: the same seed gives the same picture, whatever the threads, the passes and the ranges.
 
-use mixray::renderer::{Budget, RenderError, Renderer, RendererOptions};
+use mixray::renderer::{Budget, RenderError, Renderer, RendererOptions, Watcher};
 use mixray::scene::{BackendChoice, SamplerKind, Scene};
 
 use super::support::*;
@@ -33,11 +33,7 @@ material = {{ base_color = [0.8, 0.5, 0.3], roughness = 0.3 }}
 fn advance_by(renderer: &mut Renderer, rays_per_pixel: u64) {
     let pixels = u64::from(renderer.film().width) * u64::from(renderer.film().height);
     renderer
-        .advance(
-            Budget::Rays(rays_per_pixel * pixels),
-            &|| false,
-            &mut |_| (),
-        )
+        .advance(Budget::Rays(rays_per_pixel * pixels), &Watcher::none())
         .expect("the render goes on");
 }
 
@@ -152,7 +148,7 @@ fn ranges_that_do_not_fit_are_refused(backend: BackendChoice) {
         ..RendererOptions::default()
     };
     for (from, to) in [(3, 3), (4, 2), (0, RAYS + 1)] {
-        let refused = Renderer::new(scene.clone(), range(from, to));
+        let refused = Renderer::new(scene.clone(), range(from, to), &Watcher::none());
         assert!(matches!(refused, Err(RenderError::SampleRange(..))));
     }
     let mut first = renderer(&scene, backend, range(0, 2));
@@ -165,7 +161,7 @@ fn ranges_that_do_not_fit_are_refused(backend: BackendChoice) {
     ));
 }
 
-on_each_backend!(
+on_the_cpu!(
     threads_do_not_matter,
     passes_do_not_matter,
     ranges_merge_to_the_whole,

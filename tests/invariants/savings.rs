@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use mixray::film::Picture;
-use mixray::renderer::{CameraNoise, ErrorGoal, Renderer, RendererOptions, Skip};
+use mixray::renderer::{CameraNoise, ErrorGoal, Renderer, RendererOptions, Skip, Watcher};
 use mixray::scene::{BackendChoice, NoiseFit, Scene};
 
 use super::support::*;
@@ -76,11 +76,13 @@ struct Pictures {
 impl Pictures {
     fn of(mut renderer: Renderer, seeds: Range<u32>, goal: Option<&ErrorGoal>) -> Self {
         let pictures = seeds.map(|seed| {
-            renderer.set_samples(RAYS, seed).expect("it restarts");
+            renderer
+                .set_samples(RAYS, seed, &Watcher::none())
+                .expect("it restarts");
             match goal {
                 None => complete(&mut renderer),
                 Some(goal) => renderer
-                    .render_to_error(goal, &|| false, &mut |_| ())
+                    .render_to_error(goal, &Watcher::none())
                     .expect("it renders"),
             }
             renderer.picture()
@@ -258,7 +260,7 @@ fn adaptive_sampling_saves_rays(backend: BackendChoice) {
     let goal = goal(Some(0.008), None);
     for skip in [None, Some(Skip::Adaptive)] {
         let mut renderer = without(&scene, backend, skip);
-        (renderer.render_to_error(&goal, &|| false, &mut |_| ())).expect("it renders");
+        (renderer.render_to_error(&goal, &Watcher::none())).expect("it renders");
         let stated = renderer.stated().expect("scrambles");
         assert_eq!(stated.tiles_above_goal, 0, "{skip:?}");
     }
@@ -282,7 +284,7 @@ fn stopping_at_the_cameras_noise_saves_rays(backend: BackendChoice) {
 
     let to = |skip: Option<Skip>, goal: &ErrorGoal| {
         let mut renderer = without(&scene, backend, skip);
-        (renderer.render_to_error(goal, &|| false, &mut |_| ())).expect("it renders");
+        (renderer.render_to_error(goal, &Watcher::none())).expect("it renders");
         renderer
     };
     let patient = ErrorGoal {
@@ -305,7 +307,7 @@ fn stopping_at_the_cameras_noise_saves_rays(backend: BackendChoice) {
     assert!(film(None, &both) != even, "control");
 }
 
-on_each_backend!(
+on_the_cpu!(
     out_of_reach_changes_nothing,
     edge_real_changes_nothing,
     virtual_first_changes_nothing,

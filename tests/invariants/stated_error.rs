@@ -1,7 +1,7 @@
 //! Invariant 9: the stated error predicts the true one.
 
 use mixray::film::{Picture, planes};
-use mixray::renderer::{ErrorGoal, Renderer, RendererOptions, SCRAMBLES};
+use mixray::renderer::{ErrorGoal, Renderer, RendererOptions, SCRAMBLES, Watcher};
 use mixray::scene::{BackendChoice, Composite, Scene};
 
 use super::support::*;
@@ -38,7 +38,7 @@ fn goal(standard_error: f64) -> ErrorGoal {
 fn to_error(scene: &Scene, backend: BackendChoice, goal: &ErrorGoal) -> Renderer {
     let mut renderer = renderer(scene, backend, RendererOptions::default());
     renderer
-        .render_to_error(goal, &|| false, &mut |_| ())
+        .render_to_error(goal, &Watcher::none())
         .expect("it renders");
     renderer
 }
@@ -152,7 +152,7 @@ fn nothing_to_do_is_done(backend: BackendChoice) {
     assert_eq!(renderer.error(), 0.0);
 }
 
-on_each_backend!(
+on_the_cpu!(
     the_stated_error_predicts_the_true_one,
     it_does_so_where_light_is_rare,
     the_goal_is_met,

@@ -2,12 +2,14 @@
 
 use std::ops::Range;
 
-use mixray::film::{Film, Picture};
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::film::Picture;
+use mixray::renderer::{Renderer, RendererOptions, Watcher};
 use mixray::scene::{BackendChoice, EncodedPhoto, Photo, Scene};
 
-/// Turns checks `fn(BackendChoice)` into tests, one a backend.
-macro_rules! on_each_backend {
+pub use crate::support::{complete, largest, mask, scene};
+
+/// Turns checks `fn(BackendChoice)` into tests on the CPU. `tests/backends` holds the GPU's pictures against the CPU's.
+macro_rules! on_the_cpu {
     ($($check:ident),* $(,)?) => {
         mod cpu {
             $(#[test]
@@ -17,7 +19,7 @@ macro_rules! on_each_backend {
         }
     };
 }
-pub(crate) use on_each_backend;
+pub(crate) use on_the_cpu;
 
 /// A Lambertian table in the plane y = 0, four metres square.
 pub const TABLE: &str = r#"
@@ -50,18 +52,10 @@ edge_v = [0, 0, 0.8]
 radiance = [6, 5, 4]
 "#;
 
-/// The scene that a scene file of this text describes.
-pub fn scene(text: &str) -> Scene {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join("scene.toml");
-    std::fs::write(&path, text).expect("the scene file is written");
-    mixray::scene::load(&path).unwrap_or_else(|error| panic!("{error}\n{text}"))
-}
-
 pub fn renderer(scene: &Scene, backend: BackendChoice, options: RendererOptions) -> Renderer {
     let mut scene = scene.clone();
     scene.settings.backend = backend;
-    Renderer::new(scene, options).expect("the scene fits")
+    Renderer::new(scene, options, &Watcher::none()).expect("the scene fits")
 }
 
 /// Renders all rays.
@@ -69,13 +63,6 @@ pub fn render(scene: &Scene, backend: BackendChoice) -> Renderer {
     let mut renderer = renderer(scene, backend, RendererOptions::default());
     complete(&mut renderer);
     renderer
-}
-
-pub fn complete(renderer: &mut Renderer) {
-    renderer
-        .advance(Budget::Complete, &|| false, &mut |_| ())
-        .expect("the render completes");
-    assert_eq!(renderer.film().non_finite_samples(), 0);
 }
 
 /// A linear photograph.
@@ -91,14 +78,6 @@ pub fn photo_of(width: u32, height: u32, linear: Vec<[f32; 3]>) -> Photo {
 
 pub fn constant_photo(width: u32, height: u32, value: f32) -> Photo {
     photo_of(width, height, vec![[value; 3]; (width * height) as usize])
-}
-
-/// Fraction of each pixel's rays that met virtual geometry first.
-pub fn mask(film: &Film) -> Vec<f64> {
-    film.pixels
-        .iter()
-        .map(|p| f64::from(p.m) / f64::from(p.n.max(1)))
-        .collect()
 }
 
 /// Mean of the three channels.
@@ -181,7 +160,7 @@ impl Difference {
             |set: &[Vec<f64>]| -> Vec<f64> { set.iter().map(|means| mean(means)).collect() };
         let (x, y) = (whole(a), whole(b));
         Self {
-            worst: ts.iter().fold(0.0, |w, t| t.abs().max(w)),
+            worst: largest(ts.iter().copied()),
             rms: (ts.iter().map(|t| t * t).sum::<f64>() / ts.len().max(1) as f64).sqrt(),
             total: welch(&x, &y).unwrap_or(0.0),
             relative: (mean(&x) - mean(&y)) / scale,
@@ -223,4 +202,14 @@ fn welch(x: &[f64], y: &[f64]) -> Option<f64> {
         return None;
     }
     Some(difference / (variance_of_mean(x) + variance_of_mean(y)).sqrt())
+}
+
+#[test]
+fn a_value_that_is_not_a_number_is_a_difference() {
+    let same = vec![vec![1.0, 2.0], vec![1.5, 2.5]];
+    let mut other = same.clone();
+    assert!(Difference::between(&same, &other).is_none(), "control");
+    other[1][0] = f64::NAN;
+    let found = Difference::between(&same, &other);
+    assert!(found.worst.is_nan() && !found.is_none(), "{found}");
 }

@@ -5,7 +5,8 @@ use glam::{DMat4, DQuat, DVec3};
 use mixray::scene::BackendChoice;
 use serde_json::json;
 
-use super::support::{CAMERA, Folder, mask_row, render, scene};
+use super::support::{CAMERA, mask_row, render};
+use crate::support::{Folder, scene};
 
 /// A white square of 0.4 m at z = -1 under two nodes: the parent moves by `output` at the times 0, 1 and 2 s, the child stays.
 fn model(folder: &Folder, path: &str, interpolation: &str, output: &[f32], kind: &str) -> String {
@@ -154,7 +155,7 @@ fn animations_that_are_not_there_or_broken_are_refused() {
     let folder = Folder::new();
     let refused = |text: &str, part: &str| {
         folder.write("scene.toml", format!("{CAMERA}{text}"));
-        super::support::assert_refused(&folder.run(&["render", "scene.toml"]), part);
+        folder.refuse("render scene.toml", part);
     };
     let slide = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 3.0, 0.0, 0.0];
     let good = model(&folder, "translation", "LINEAR", &slide, "VEC3");

@@ -2,10 +2,11 @@
 
 use mixray::film::Film;
 use mixray::gpu::harness::test_device;
-use mixray::renderer::{Renderer, RendererOptions};
+use mixray::renderer::{Renderer, RendererOptions, Watcher};
 use mixray::scene::BackendChoice;
 
-use super::support::{CAMERA, SQUARE, mask_row, render, scene};
+use super::support::{CAMERA, SQUARE, mask_row, render};
+use crate::support::{largest, scene};
 
 const SHUTTER: &str = "[shutter]\nexposure_secs = 0.5\n[render]\nrays_per_pixel = 256\n";
 /// 0.2 m, or 20 px, in the half second for which the shutter is open.
@@ -30,9 +31,7 @@ fn smeared(x: usize, width: f64) -> f64 {
 }
 
 fn worst(found: &[f64], expected: impl Fn(usize) -> f64) -> f64 {
-    (0..found.len())
-        .map(|x| (found[x] - expected(x)).abs())
-        .fold(0.0, f64::max)
+    largest((0..found.len()).map(|x| found[x] - expected(x)))
 }
 
 #[test]
@@ -206,14 +205,11 @@ fn a_moving_scene_rendered_in_steps_is_the_same() {
         "{CAMERA}{SQUARE}{OBJECT_MOTION}[shutter]\nexposure_secs = 0.5\nsamples = 5\n[render]\nrays_per_pixel = 16\nbackend = \"cpu\"\n"
     );
     let whole = render(&text, BackendChoice::Cpu);
-    let mut steps = Renderer::new(scene(&text), RendererOptions::default()).expect("fits");
+    let mut steps =
+        Renderer::new(scene(&text), RendererOptions::default(), &Watcher::none()).expect("fits");
     for _ in 0..40 {
         steps
-            .advance(
-                mixray::renderer::Budget::Rays(96 * 24),
-                &|| false,
-                &mut |_| (),
-            )
+            .advance(mixray::renderer::Budget::Rays(96 * 24), &Watcher::none())
             .expect("renders");
     }
     assert_eq!(steps.samples(), 16);

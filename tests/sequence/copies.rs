@@ -4,7 +4,7 @@ use image::{Rgb, RgbImage};
 use mixray::scene::MotionBlurSettings;
 use mixray::stages::motion_blur::{Copies, draw_copies};
 
-use super::support::Folder;
+use crate::support::Folder;
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 8;

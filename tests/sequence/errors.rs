@@ -3,7 +3,8 @@
 use std::io::Write;
 use std::process::Stdio;
 
-use super::support::{BALL, Folder, assert_refused, sequence, y4m};
+use super::support::{BALL, sequence, y4m};
+use crate::support::{Folder, assert_refused};
 
 fn folder() -> Folder {
     let folder = Folder::new();
@@ -17,34 +18,34 @@ fn poses_and_frames_that_do_not_fit_are_refused() {
     let folder = folder();
     let to = ["--frames", "in", "-o", "out"];
     folder.trajectory(3, 0.02, &[]);
-    folder.refused(&to, "no pose for f_0003.png");
+    folder.refuse_sequence(&to, "no pose for f_0003.png");
     assert!(
         folder.frames_of("out").is_empty(),
         "before anything is rendered"
     );
     let text = std::fs::read_to_string(folder.path("poses.json")).expect("reads");
     folder.write("poses.json", text.replace("[0,1,0,0]", "[0,1,0,NaN]"));
-    folder.refused(&to, "NaN");
+    folder.refuse_sequence(&to, "NaN");
     folder.write("poses.json", text.replace("[0,1,0,0]", "[0,2,0,0]"));
-    folder.refused(&to, "not rigid");
+    folder.refuse_sequence(&to, "not rigid");
     folder.trajectory(4, 0.02, &[]);
 
     std::fs::remove_file(folder.path("in/f_0002.png")).expect("removes");
-    folder.refused(&to, "frame 2 is missing");
-    folder.refused(
+    folder.refuse_sequence(&to, "frame 2 is missing");
+    folder.refuse_sequence(
         &["--frames", "in", "-o", "out", "--range", "1..3"],
         "frame 2 is missing",
     );
-    folder.refused(
+    folder.refuse_sequence(
         &["--frames", "in", "-o", "out", "--range", "9..12"],
         "no frame of the range",
     );
-    folder.save("in/f_0002.png", 48, 36, 2);
-    folder.refused(&["--frames", "in", "-o", "in"], "would be replaced");
-    folder.refused(&["--frames", "none", "-o", "out"], "none");
-    folder.refused(&["-o", "out"], "--frames is absent");
-    folder.save("in/g_0002.png", 48, 36, 2);
-    folder.refused(&to, "have one number");
+    folder.save_frame("in/f_0002.png", 48, 36, 2);
+    folder.refuse_sequence(&["--frames", "in", "-o", "in"], "would be overwritten");
+    folder.refuse_sequence(&["--frames", "none", "-o", "out"], "none");
+    folder.refuse_sequence(&["-o", "out"], "--frames is absent");
+    folder.save_frame("in/g_0002.png", 48, 36, 2);
+    folder.refuse_sequence(&to, "have one number");
     std::fs::remove_file(folder.path("in/g_0002.png")).expect("removes");
 
     folder.write(
@@ -57,14 +58,14 @@ fn poses_and_frames_that_do_not_fit_are_refused() {
         "poses.json",
         untimed.replace("\"frames_per_second\": 10, ", ""),
     );
-    folder.refused(&to, "--fps");
+    folder.refuse_sequence(&to, "--fps");
 }
 
 #[test]
 fn a_frame_of_another_size_ends_the_sequence_and_keeps_what_is_done() {
     let folder = folder();
-    folder.save("in/f_0002.png", 40, 36, 2);
-    folder.refused(
+    folder.save_frame("in/f_0002.png", 40, 36, 2);
+    folder.refuse_sequence(
         &["--frames", "in", "-o", "out"],
         "f_0002.png: it has 40 x 36 pixels",
     );
@@ -78,7 +79,7 @@ fn another_render_in_the_folder_is_not_mixed_up_with_this_one() {
     folder.sequence(&to);
     let first = folder.frames_of("out");
     folder.write("scene.toml", BALL.replace("0.8, 0.4, 0.2", "0.2, 0.4, 0.8"));
-    folder.refused(&to, "another render");
+    folder.refuse_sequence(&to, "another render");
     assert_eq!(folder.frames_of("out"), first);
     let mut replace = to.to_vec();
     replace.push("--overwrite");

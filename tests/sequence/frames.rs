@@ -1,15 +1,15 @@
 //! Frames in and out: what passes, what stays put, what is blurred.
 
 use std::io::Write;
-use std::path::Path;
 use std::process::Stdio;
 
 use glam::{DMat4, DVec3};
 use mixray::camera::lens::project;
-use mixray::renderer::{Budget, FrameEdit, Renderer, RendererOptions};
+use mixray::renderer::{Budget, FrameEdit, Renderer, RendererOptions, Watcher};
 use mixray::scene::trajectory::{CameraPath, FrameName, Trajectory, Views};
 
-use super::support::{BALL, Folder, scene, sequence, y4m};
+use super::support::{BALL, sequence, y4m};
+use crate::support::{Folder, scene, shared_data};
 
 #[test]
 fn null_poses_pass_through_and_are_counted() {
@@ -92,7 +92,8 @@ fn an_object_stays_where_the_poses_put_it() {
         [[virtual]]\nshape = \"sphere\"\nscale = 0.04\ntranslation = [0.1, 0.05, -1]\nmaterial = { base_color = [1, 1, 1], unlit = true }\n[render]\nrays_per_pixel = 256\nbackend = \"cpu\"\n";
     let scene = scene(text);
     let centre = DVec3::new(0.1, 0.05, -1.0);
-    let mut renderer = Renderer::new(scene.clone(), RendererOptions::default()).expect("fits");
+    let mut renderer =
+        Renderer::new(scene.clone(), RendererOptions::default(), &Watcher::none()).expect("fits");
     for number in 0..5 {
         let along = f64::from(number);
         let pose = DMat4::from_translation(DVec3::new(0.05 * along, -0.02 * along, 0.4 * along))
@@ -109,9 +110,9 @@ fn an_object_stays_where_the_poses_put_it() {
             seed: number,
             anchor: None,
         };
-        renderer.set_frame(edit).expect("fits");
+        renderer.set_frame(edit, &Watcher::none()).expect("fits");
         renderer
-            .advance(Budget::Complete, &|| false, &mut |_| ())
+            .advance(Budget::Complete, &Watcher::none())
             .expect("renders");
         let film = renderer.film();
         let mut sums = DVec3::ZERO;
@@ -162,16 +163,13 @@ fn outline(eye: DVec3, centre: DVec3, radius: f64) -> Vec<DVec3> {
 /// The renderer's own arithmetic sees known points of the webcam videos where their poses do.
 #[test]
 fn known_points_of_the_webcam_videos_are_where_the_poses_put_them() {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     for (name, posed) in [
         ("webcam_chessboard_video", 109),
         ("webcam_marker_grid_video", 325),
     ] {
-        let path = data.join(name).join("trajectory.json");
-        if !path.exists() {
-            eprintln!("SKIPPED: {} is absent", path.display());
+        let Some(path) = shared_data(&format!("{name}/trajectory.json")) else {
             return;
-        }
+        };
         let folder = Folder::new();
         let trajectory = Trajectory::read(&path).expect("reads");
         let views = Views::new(&trajectory, None, true).expect("no doubles");

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use mixray::film::{Film, PixelSums};
-use mixray::renderer::{Budget, Renderer, RendererOptions};
+use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{BackendChoice, Scene};
 
-use super::support::scene;
+use crate::support::scene;
 
 const RAYS: u32 = 8;
 const ALL: (u32, u32) = (0, RAYS);
@@ -105,13 +105,13 @@ fn renderer(scene: &Scene, range: (u32, u32), all_planes: bool) -> Renderer {
         all_planes,
         ..RendererOptions::default()
     };
-    Renderer::new(scene.clone(), options).expect("fits")
+    Renderer::new(scene.clone(), options, &Watcher::none()).expect("fits")
 }
 
 fn rendered(scene: &Scene, range: (u32, u32), all_planes: bool) -> Renderer {
     let mut renderer = renderer(scene, range, all_planes);
     renderer
-        .advance(Budget::Complete, &|| false, &mut |_| ())
+        .advance(Budget::Complete, &Watcher::none())
         .expect("renders");
     assert_eq!(
         renderer.samples(),
@@ -213,9 +213,7 @@ fn a_render_in_steps_is_one_run() {
                 let mut steps = renderer(&scene, range, all_planes);
                 let mut calls = 0;
                 while steps.samples() < range.1 - range.0 {
-                    steps
-                        .advance(budget, &|| false, &mut |_| ())
-                        .expect("renders");
+                    steps.advance(budget, &Watcher::none()).expect("renders");
                     calls += 1;
                     assert!(calls < 10_000, "{name}, {range:?}: {budget:?} does not end");
                     if let Budget::Rays(rays) = budget {

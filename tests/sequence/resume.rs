@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use super::support::{BALL, Folder, sequence, y4m};
+use super::support::{BALL, sequence, y4m};
+use crate::support::Folder;
 
 /// Steps of 0.4 m: the coordinates' origin moves with the camera on the way.
 fn folder() -> Folder {
@@ -80,7 +81,7 @@ fn frames_without_a_saving() {
     for saving in ["cones", "beams"] {
         assert_ne!(to(saving, &["--no-skip", saving]), usual, "{saving}");
         let again = ["--frames", "in", "-o", "usual", "--no-skip", saving];
-        folder.refused(&again, "--overwrite");
+        folder.refuse_sequence(&again, "--overwrite");
     }
 }
 

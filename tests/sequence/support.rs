@@ -1,11 +1,11 @@
 //! Scenes in memory, and a folder with frames, a trajectory and the built program.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
-use image::{Rgb, RgbImage};
-use mixray::renderer::{Budget, Renderer, RendererOptions};
-use mixray::scene::{BackendChoice, Scene};
+use mixray::renderer::{Renderer, RendererOptions, Watcher};
+use mixray::scene::BackendChoice;
+
+use crate::support::{Folder, complete, mask, scene};
 
 /// A white square of 40 px in the middle of 96 x 24, one metre away, a pixel a centimetre.
 pub const SQUARE: &str = "
@@ -18,36 +18,20 @@ material = { base_color = [1, 1, 1], unlit = true }
 ";
 pub const CAMERA: &str = "[camera]\nwidth = 96\nheight = 24\nfx = 100\n";
 
-pub fn scene(text: &str) -> Scene {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join("scene.toml");
-    std::fs::write(&path, text).expect("a writable folder");
-    mixray::scene::load(&path).unwrap_or_else(|error| panic!("{error}\n{text}"))
-}
-
 pub fn render(text: &str, backend: BackendChoice) -> Renderer {
     let mut scene = scene(text);
     scene.settings.backend = backend;
-    let mut renderer = Renderer::new(scene, RendererOptions::default()).expect("the scene fits");
-    renderer
-        .advance(Budget::Complete, &|| false, &mut |_| ())
-        .expect("renders");
-    assert_eq!(renderer.film().non_finite_samples(), 0);
+    let mut renderer =
+        Renderer::new(scene, RendererOptions::default(), &Watcher::none()).expect("the scene fits");
+    complete(&mut renderer);
     renderer
 }
 
 /// M of a row.
 pub fn mask_row(renderer: &Renderer, row: u32) -> Vec<f64> {
-    let film = renderer.film();
-    let width = film.width as usize;
-    film.pixels[row as usize * width..][..width]
-        .iter()
-        .map(|sums| f64::from(sums.m) / f64::from(sums.n.max(1)))
-        .collect()
+    let width = renderer.film().width as usize;
+    mask(renderer.film())[row as usize * width..][..width].to_vec()
 }
-
-/// A folder that goes when the test ends.
-pub struct Folder(tempfile::TempDir);
 
 /// A ball over a floor, in front of the cameras of [`Folder::trajectory`].
 pub const BALL: &str = "[camera]\nfx = 40\n[environment]\nradiance = [0.6, 0.6, 0.6]\n[[real]]\nshape = \"quad\"\ncorner = [-2, -0.3, 1]\nedge_u = [6, 0, 0]\nedge_v = [0, 0, -6]\n\
@@ -55,28 +39,18 @@ pub const BALL: &str = "[camera]\nfx = 40\n[environment]\nradiance = [0.6, 0.6, 
     [render]\nrays_per_pixel = 4\nbackend = \"cpu\"\nmax_bounces = 1\n";
 
 impl Folder {
-    pub fn new() -> Self {
-        Self(tempfile::tempdir().expect("a temporary folder"))
-    }
-
-    pub fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    pub fn write(&self, name: &str, contents: impl AsRef<[u8]>) {
-        std::fs::write(self.path(name), contents).expect("a writable folder");
-    }
-
-    pub fn save(&self, name: &str, width: u32, height: u32, stream: u32) {
-        let path = self.path(name);
-        std::fs::create_dir_all(path.parent().expect("a folder")).expect("a writable folder");
-        picture(width, height, stream).save(path).expect("saves");
+    /// Frame `number` of a stream whose every frame is another picture.
+    pub fn save_frame(&self, name: &str, width: u32, height: u32, number: u32) {
+        self.save(name, width, height, |x, y| {
+            [0, 40, 80].map(|c| ((x * 5 + y * 3 + number * 17 + c) % 256) as u8)
+        });
     }
 
     /// Frames 0 to `count` - 1 of 48 x 36 in `in/`, and a camera that steps to the right by `step_m` each, ten a second.
     pub fn frames(&self, count: u32, step_m: f64) {
+        self.create("in");
         for number in 0..count {
-            self.save(&format!("in/f_{number:04}.png"), 48, 36, number);
+            self.save_frame(&format!("in/f_{number:04}.png"), 48, 36, number);
         }
         self.trajectory(count, step_m, &[]);
     }
@@ -98,27 +72,14 @@ impl Folder {
         self.write("poses.json", text);
     }
 
-    pub fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mixray"));
-        command.current_dir(self.0.path()).args(arguments);
-        command
-    }
-
-    pub fn run(&self, arguments: &[&str]) -> Output {
-        self.command(arguments).output().expect("runs")
-    }
-
     /// `mixray sequence scene.toml --trajectory poses.json` and more; it must succeed. Its stdout.
     pub fn sequence(&self, more: &[&str]) -> String {
-        let output = self.run(&sequence(more));
-        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(0), "{more:?}: {stderr}");
-        String::from_utf8_lossy(&output.stdout).into_owned()
+        self.succeed(&sequence(more))
     }
 
     /// The same, which must be refused in one line that holds `part`.
-    pub fn refused(&self, more: &[&str], part: &str) {
-        assert_refused(&self.run(&sequence(more)), part);
+    pub fn refuse_sequence(&self, more: &[&str], part: &str) {
+        self.refuse(&sequence(more), part);
     }
 
     /// Names and contents of the frames in a folder.
@@ -131,14 +92,6 @@ pub fn sequence<'a>(more: &[&'a str]) -> Vec<&'a str> {
     let mut arguments = vec!["sequence", "scene.toml", "--trajectory", "poses.json"];
     arguments.extend(more);
     arguments
-}
-
-pub fn assert_refused(output: &Output, part: &str) {
-    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{part}: {stderr}");
-    assert!(stderr.starts_with("error:"), "{stderr}");
-    assert!(stderr.contains(part), "{stderr} lacks {part}");
-    assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
 }
 
 pub fn frames_of(folder: &Path) -> Vec<(String, Vec<u8>)> {
@@ -160,14 +113,6 @@ pub fn frames_of(folder: &Path) -> Vec<(String, Vec<u8>)> {
         .unwrap_or_default();
     frames.sort();
     frames
-}
-
-/// Every frame another picture.
-pub fn picture(width: u32, height: u32, stream: u32) -> RgbImage {
-    RgbImage::from_fn(width, height, |x, y| {
-        let value = |c: u32| (x * 5 + y * 3 + stream * 17 + c * 40) % 256;
-        Rgb([0, 1, 2].map(|c| value(c) as u8))
-    })
 }
 
 /// A Y4M stream of 4:2:0 with these numbers for planes.

@@ -4,13 +4,13 @@ use mixray::film::Picture;
 use mixray::scene::AntialiasSettings;
 use mixray::stages::antialias::antialias;
 
-use super::support::Rng;
+use crate::support::{Random, largest};
 
 const WIDTH: i32 = 23;
 const HEIGHT: i32 = 17;
 
 fn inputs() -> (Picture, Vec<f32>) {
-    let mut rng = Rng(2);
+    let mut rng = Random(2);
     let linear = (0..WIDTH * HEIGHT)
         .map(|_| [(); 3].map(|()| rng.uniform() as f32))
         .collect();
@@ -62,9 +62,7 @@ fn transcription(picture: &Picture, mask: &[f32], beta: f64) -> Vec<[f64; 3]> {
 
 fn worst(picture: &Picture, truth: &[[f64; 3]]) -> f64 {
     let pairs = picture.linear.iter().flatten().zip(truth.iter().flatten());
-    pairs
-        .map(|(a, b)| (f64::from(*a) - b).abs())
-        .fold(0.0, f64::max)
+    largest(pairs.map(|(a, b)| f64::from(*a) - b))
 }
 
 #[test]

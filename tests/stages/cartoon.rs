@@ -1,8 +1,11 @@
 //! The cartoon against a plain f64 transcription of the paper's equations 1 to 5, pixel by pixel with nothing shared or reordered.
 
+use mixray::math::hash_u32;
 use mixray::scene::{CartoonSettings, CartoonStyle};
 use mixray::stages::EncodedImage;
 use mixray::stages::cartoon::cartoon;
+
+use crate::support::largest;
 
 type Rgb = [f64; 3];
 
@@ -159,14 +162,6 @@ fn transcription(image: &Image, s: &CartoonSettings) -> Image {
     })
 }
 
-fn hash(mut x: u32) -> u32 {
-    x ^= x >> 16;
-    x = x.wrapping_mul(0x7feb_352d);
-    x ^= x >> 15;
-    x = x.wrapping_mul(0x846c_a68b);
-    x ^ (x >> 16)
-}
-
 /// Coloured discs and stripes on a gradient, with noise: edges of every strength.
 fn picture(width: u32, height: u32) -> EncodedImage {
     let rgb = (0..width * height)
@@ -178,7 +173,7 @@ fn picture(width: u32, height: u32) -> EncodedImage {
                 0.4,
             ];
             for disc in 0..9 {
-                let [a, b, c] = [1, 2, 3].map(|k| hash(disc * 7 + k) as f32 / u32::MAX as f32);
+                let [a, b, c] = [1, 2, 3].map(|k| hash_u32(disc * 7 + k) as f32 / u32::MAX as f32);
                 let distance = (x - a * width as f32).hypot(y - b * height as f32);
                 if distance < 4.0 + 0.12 * c * width as f32 {
                     let strength = 0.02 + 0.3 * c;
@@ -186,7 +181,7 @@ fn picture(width: u32, height: u32) -> EncodedImage {
                 }
             }
             std::array::from_fn(|c| {
-                let noise = hash(i * 3 + c as u32) as f32 / u32::MAX as f32 - 0.5;
+                let noise = hash_u32(i * 3 + c as u32) as f32 / u32::MAX as f32 - 0.5;
                 (rgb[c] + 0.03 * noise).clamp(0.0, 1.0)
             })
         })
@@ -205,11 +200,8 @@ fn in_f64(image: &EncodedImage) -> Image {
 /// Largest difference in 8-bit codes.
 fn worst_codes(a: &EncodedImage, b: &Image) -> f64 {
     let code = |x: f64| (x.clamp(0.0, 1.0) * 255.0 + 0.5).floor();
-    a.rgb
-        .iter()
-        .zip(&b.rgb)
-        .flat_map(|(a, b)| (0..3).map(move |c| (code(f64::from(a[c])) - code(b[c])).abs()))
-        .fold(0.0, f64::max)
+    let pairs = a.rgb.iter().zip(&b.rgb);
+    largest(pairs.flat_map(|(a, b)| (0..3).map(move |c| code(f64::from(a[c])) - code(b[c]))))
 }
 
 fn cases() -> Vec<CartoonSettings> {
@@ -325,7 +317,7 @@ fn the_flow_style_draws_whole_lines_along_contours() {
         rgb: (0..width * height)
             .map(|i| {
                 let radius = disc((i % width) as f32, (i / width) as f32);
-                let noise = hash(i) as f32 / u32::MAX as f32 - 0.5;
+                let noise = hash_u32(i) as f32 / u32::MAX as f32 - 0.5;
                 [if radius < 30.0 { 0.3 } else { 0.6 } + 0.04 * noise; 3]
             })
             .collect(),

@@ -3,10 +3,16 @@
 use exr::WritableImage as _;
 use exr::prelude as exr;
 
-use super::support::{Folder, Rng, open, spread};
+use super::spread;
+use crate::support::{Folder, Random, assert_refused, stderr};
+
+/// Lacks the profile's name and the output's.
+const APPLY: &str = "noise apply photo.png layer.png mask.png --profile";
+/// Lacks the mask and the output.
+const ANTIALIAS: &str = "antialias photo.png layer.png";
 
 fn noisy(folder: &Folder, name: &str, level: f64, sigma: f64, seed: u64) {
-    let mut rng = Rng(seed);
+    let mut rng = Random(seed);
     let values: Vec<u8> = (0..3 * 64 * 48)
         .map(|_| (level + sigma * rng.normal()).round().clamp(0.0, 255.0) as u8)
         .collect();
@@ -25,48 +31,24 @@ fn layers(folder: &Folder) {
 #[test]
 fn calibrate_writes_a_profile_that_apply_uses() {
     let folder = Folder::new();
-    std::fs::create_dir(folder.path("scene")).unwrap();
+    folder.create("scene");
     for f in 0..6 {
         noisy(&folder, &format!("scene/{f}.png"), 140.0, 3.0, 100 + f);
     }
-    let said = folder.done(&[
-        "noise",
-        "calibrate",
-        "scene",
-        "-o",
-        "noise.toml",
-        "--report",
-        "page.html",
-    ]);
+    let said = folder.succeed("noise calibrate scene -o noise.toml --report page.html");
     assert!(
         said.contains("noise.toml") && said.contains("page.html"),
         "{said}"
     );
-    assert!(
-        std::fs::read_to_string(folder.path("page.html"))
-            .unwrap()
-            .contains("<svg")
-    );
+    assert!(folder.read("page.html").contains("<svg"));
     layers(&folder);
-    let apply = |out: &str, more: &[&str]| {
-        let mut arguments = vec![
-            "noise",
-            "apply",
-            "photo.png",
-            "layer.png",
-            "mask.png",
-            "--profile",
-            "noise.toml",
-            "-o",
-            out,
-        ];
-        arguments.extend(more);
-        folder.done(&arguments);
-        open(&folder.path(out))
+    let apply = |out: &str, more: &str| {
+        folder.succeed(&format!("{APPLY} noise.toml -o {out} {more}"));
+        folder.open(out)
     };
-    let photo = open(&folder.path("photo.png"));
-    let (a, b) = (apply("a.png", &[]), apply("b.png", &["--frame", "1"]));
-    assert_eq!(a, apply("a2.png", &["--frame", "0"]), "reproducible");
+    let photo = folder.open("photo.png");
+    let (a, b) = (apply("a.png", ""), apply("b.png", "--frame 1"));
+    assert_eq!(a, apply("a2.png", "--frame 0"), "reproducible");
     for x in 0..32 {
         assert!(
             (0..48).all(|y| a.get_pixel(x, y) == photo.get_pixel(x, y)),
@@ -83,27 +65,18 @@ fn calibrate_writes_a_profile_that_apply_uses() {
     assert!((level(&a) - 3.0).abs() < 0.3, "{}", level(&a));
     assert_ne!(a, b, "frames differ");
     for more in [
-        &["--paper"][..],
-        &[
-            "--method",
-            "textures",
-            "--texture-size",
-            "64",
-            "--magnification",
-            "2",
-            "--update-delay",
-            "2",
-        ],
+        "--paper",
+        "--method textures --texture-size 64 --magnification 2 --update-delay 2",
     ] {
         let picture = apply("c.png", more);
         assert!(
             (level(&picture) - 3.0).abs() < 0.4,
-            "{more:?} {}",
+            "{more} {}",
             level(&picture)
         );
     }
     assert!(
-        level(&apply("d.png", &["--scale", "0"])) < 0.01,
+        level(&apply("d.png", "--scale 0")) < 0.01,
         "control: no noise"
     );
 }
@@ -151,39 +124,24 @@ fn open_exr_channels_say_what_is_virtual() {
             ("ViewLayer.Depth.Z", &depth),
         ],
     );
-    let run = |mask: &str, more: &[&str]| {
-        let mut arguments = vec!["antialias", "photo.png", "layer.png", mask, "-o", "out.png"];
-        arguments.extend(more);
-        folder.run(&arguments)
+    let line = |mask: &str| format!("{ANTIALIAS} {mask} -o out.png");
+    let picture = |mask: &str| {
+        folder.succeed(&line(mask));
+        folder.open("out.png")
     };
-    let picture = |mask: &str, more: &[&str]| {
-        let output = run(mask, more);
-        assert_eq!(output.status.code(), Some(0), "{mask} {output:?}");
-        open(&folder.path("out.png"))
-    };
-    let expected = picture("mask.png", &[]);
-    assert_eq!(expected, picture("own.exr", &[]));
-    let far: &[&str] = &["--depth", "--far", "1e6"];
-    assert_eq!(expected, picture("own.exr", far));
-    assert_eq!(expected, picture("other.exr", far));
-    assert_ne!(
-        expected,
-        picture("other.exr", &["--depth", "--far", "2"]),
-        "control"
-    );
-    let refused = |mask: &str| {
-        let output = run(mask, &[]);
-        assert_eq!(output.status.code(), Some(2));
-        String::from_utf8_lossy(&output.stderr).into_owned()
-    };
-    assert!(refused("other.exr").contains("expected one of them"));
+    let expected = picture("mask.png");
+    assert_eq!(expected, picture("own.exr"));
+    assert_eq!(expected, picture("own.exr --depth --far 1e6"));
+    assert_eq!(expected, picture("other.exr --depth --far 1e6"));
+    assert_ne!(expected, picture("other.exr --depth --far 2"), "control");
+    folder.refuse(&line("other.exr"), "expected one of them");
     save_exr(
         &folder,
         "nan.exr",
         &[("mask.Y", &|x| if x == 5 { f32::NAN } else { 0.0 })],
     );
-    assert!(refused("nan.exr").contains("pixel (5, 0) is NaN"));
-    assert!(refused("absent.exr").contains("absent.exr"));
+    folder.refuse(&line("nan.exr"), "pixel (5, 0) is NaN");
+    folder.refuse(&line("absent.exr"), "absent.exr");
 }
 
 #[test]
@@ -194,14 +152,12 @@ fn depth_and_masks_say_what_is_virtual() {
     folder.save("depth.png", 64, 48, |x, _| {
         [if x < 32 { 255 } else { 120 }; 3]
     });
-    let run = |out: &str, mask: &str, more: &[&str]| {
-        let mut arguments = vec!["antialias", "photo.png", "layer.png", mask, "-o", out];
-        arguments.extend(more);
-        folder.done(&arguments);
-        open(&folder.path(out))
+    let run = |out: &str, mask: &str| {
+        folder.succeed(&format!("{ANTIALIAS} {mask} -o {out}"));
+        folder.open(out)
     };
-    let by_mask = run("a.png", "mask.png", &[]);
-    assert_eq!(by_mask, run("b.png", "depth.png", &["--depth"]));
+    let by_mask = run("a.png", "mask.png");
+    assert_eq!(by_mask, run("b.png", "depth.png --depth"));
     assert_eq!(by_mask.get_pixel(40, 20).0, [180; 3]);
     assert_ne!(
         by_mask.get_pixel(32, 20).0,
@@ -209,38 +165,20 @@ fn depth_and_masks_say_what_is_virtual() {
         "the border is blended"
     );
     assert_eq!(
-        run("c.png", "mask.png", &["--beta", "0"])
-            .get_pixel(32, 20)
-            .0,
+        run("c.png", "mask.png --beta 0").get_pixel(32, 20).0,
         [180; 3],
         "control"
     );
     folder.save("soft.png", 64, 48, |x, _| [(4 * x) as u8; 3]);
-    let output = folder.run(&[
-        "antialias",
-        "photo.png",
-        "layer.png",
-        "soft.png",
-        "-o",
-        "d.png",
-    ]);
+    let output = folder.run(&format!("{ANTIALIAS} soft.png -o d.png"));
     assert_eq!(output.status.code(), Some(0));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("soft already"));
+    assert!(stderr(&output).contains("soft already"));
 }
 
 #[test]
 fn presets_are_given_by_hand() {
     let folder = Folder::new();
-    folder.done(&[
-        "noise",
-        "calibrate",
-        "--from",
-        "0.02,0.5",
-        "-o",
-        "n.toml",
-        "--bins",
-        "8",
-    ]);
+    folder.succeed("noise calibrate --from 0.02,0.5 -o n.toml --bins 8");
     let profile = mixray::scene::NoiseProfile::read(&folder.path("n.toml")).unwrap();
     assert_eq!(profile.bins.len(), 8);
     let expected = (0.02f64 * 16.0 + 0.5).sqrt();
@@ -257,20 +195,9 @@ fn the_cartoon_writes_picture_and_edges() {
             [90, 120, 150]
         }
     });
-    let said = folder.done(&[
-        "cartoon",
-        "in.png",
-        "out.png",
-        "--edges",
-        "edges.png",
-        "--shrunk",
-        "32x24",
-    ]);
+    let said = folder.succeed("cartoon in.png out.png --edges edges.png --shrunk 32x24");
     assert!(said.contains("out.png"), "{said}");
-    let (picture, edges) = (
-        open(&folder.path("out.png")),
-        open(&folder.path("edges.png")),
-    );
+    let (picture, edges) = (folder.open("out.png"), folder.open("edges.png"));
     assert_eq!(picture.dimensions(), (64, 48));
     assert_eq!(edges.dimensions(), (192, 48));
     let dark = picture
@@ -278,97 +205,38 @@ fn the_cartoon_writes_picture_and_edges() {
         .filter(|p| p.0.iter().all(|c| *c < 80))
         .count();
     assert!(dark > 40, "{dark}");
-    folder.done(&["cartoon", "in.png", "flow.png", "--style", "flow"]);
-    assert_ne!(open(&folder.path("flow.png")), picture, "control");
-    folder.done(&["cartoon", "out.png", "out.exr", "--iterations", "0"]);
+    folder.succeed("cartoon in.png flow.png --style flow");
+    assert_ne!(folder.open("flow.png"), picture, "control");
+    folder.succeed("cartoon out.png out.exr --iterations 0");
 }
 
 #[test]
 fn what_cannot_be_used_is_refused() {
     let folder = Folder::new();
     layers(&folder);
-    std::fs::create_dir(folder.path("empty")).unwrap();
-    folder.refused(
-        &["noise", "calibrate", "empty", "-o", "n.toml"],
-        "no pictures",
-    );
-    folder.refused(
-        &["noise", "calibrate", "photo.png", "-o", "n.toml"],
-        "one frame only",
-    );
-    folder.refused(
-        &[
-            "noise",
-            "calibrate",
-            "none.png",
-            "other.png",
-            "-o",
-            "n.toml",
-        ],
-        "none.png",
-    );
+    folder.create("empty");
+    folder.refuse("noise calibrate empty -o n.toml", "no pictures");
+    folder.refuse("noise calibrate photo.png -o n.toml", "one frame only");
+    folder.refuse("noise calibrate none.png other.png -o n.toml", "none.png");
     folder.save("small.png", 8, 8, |_, _| [9; 3]);
-    folder.refused(
-        &[
-            "noise",
-            "calibrate",
-            "photo.png",
-            "small.png",
-            "-o",
-            "n.toml",
-        ],
-        "one size",
-    );
-    folder.refused(
-        &[
-            "antialias",
-            "photo.png",
-            "small.png",
-            "mask.png",
-            "-o",
-            "o.png",
-        ],
+    folder.refuse("noise calibrate photo.png small.png -o n.toml", "one size");
+    folder.refuse(
+        "antialias photo.png small.png mask.png -o o.png",
         "expected one size",
     );
-    folder.done(&["noise", "calibrate", "--from", "0,1", "-o", "n.toml"]);
-    let text = std::fs::read_to_string(folder.path("n.toml")).unwrap();
-    folder.write("later.toml", &text.replace("version = 1", "version = 9"));
-    let apply = |profile| {
-        [
-            "noise",
-            "apply",
-            "photo.png",
-            "layer.png",
-            "mask.png",
-            "--profile",
-            profile,
-            "-o",
-            "o.png",
-        ]
-    };
-    folder.refused(&apply("later.toml"), "version 9; expected version 1");
-    folder.refused(&apply("photo.png"), "photo.png");
-    folder.refused(&["cartoon", "n.toml", "o.png"], "format is not known");
+    folder.succeed("noise calibrate --from 0,1 -o n.toml");
+    let text = folder.read("n.toml");
+    folder.write("later.toml", text.replace("version = 1", "version = 9"));
+    let apply = |profile: &str| format!("{APPLY} {profile} -o o.png");
+    folder.refuse(&apply("later.toml"), "version 9; expected version 1");
+    folder.refuse(&apply("photo.png"), "photo.png");
+    folder.refuse("cartoon n.toml o.png", "format is not known");
     assert!(!folder.path("o.png").exists());
-    folder.done(&apply("n.toml"));
+    folder.succeed(&apply("n.toml"));
     assert!(folder.path("o.png").exists(), "control");
-    for bad in [["--bins", "3"], ["--bins", "0"]] {
-        assert_eq!(
-            folder
-                .run(&[
-                    "noise",
-                    "calibrate",
-                    "--from",
-                    "0,1",
-                    "-o",
-                    "n.toml",
-                    bad[0],
-                    bad[1]
-                ])
-                .status
-                .code(),
-            Some(2)
-        );
+    for bad in [3, 0] {
+        let line = format!("noise calibrate --from 0,1 -o n.toml --bins {bad}");
+        assert_eq!(folder.run(&line).status.code(), Some(2));
     }
 }
 
@@ -379,72 +247,35 @@ fn inputs_are_never_overwritten() {
     for f in 0..3 {
         noisy(&folder, &format!("f{f}.png"), 140.0, 3.0, 100 + f);
     }
-    folder.done(&["noise", "calibrate", "--from", "0.02,2", "-o", "noise.toml"]);
-    let refused = |arguments: &[&str], kept: &str, said: &str| {
-        let before = std::fs::read(folder.path(kept)).unwrap();
-        let output = folder.run(arguments);
-        let message = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?} {message}");
-        assert!(message.contains(said), "{arguments:?} {message}");
-        assert_eq!(std::fs::read(folder.path(kept)).unwrap(), before);
+    folder.succeed("noise calibrate --from 0.02,2 -o noise.toml");
+    let refused = |line: &str, kept: &str, said: &str| {
+        let before = folder.bytes(kept);
+        folder.refuse(line, said);
+        assert_eq!(folder.bytes(kept), before);
     };
     let read = "would be overwritten";
-    refused(&["cartoon", "photo.png", "photo.png"], "photo.png", read);
-    refused(&["cartoon", "photo.png", "./photo.png"], "photo.png", read);
+    refused("cartoon photo.png photo.png", "photo.png", read);
+    refused("cartoon photo.png ./photo.png", "photo.png", read);
+    let antialias = format!("{ANTIALIAS} mask.png -o layer.png");
+    refused(&antialias, "layer.png", read);
+    let apply = format!("{APPLY} noise.toml -o photo.png");
+    refused(&apply, "photo.png", read);
+    for frames in ["f0.png f1.png f2.png", "."] {
+        let calibrate = format!("noise calibrate {frames} -o f0.png");
+        refused(&calibrate, "f0.png", read);
+    }
+    let twice = "named for two outputs";
     refused(
-        &[
-            "antialias",
-            "photo.png",
-            "layer.png",
-            "mask.png",
-            "-o",
-            "layer.png",
-        ],
-        "layer.png",
-        read,
-    );
-    let apply = [
-        "noise",
-        "apply",
-        "photo.png",
-        "layer.png",
-        "mask.png",
-        "--profile",
-        "noise.toml",
-        "-o",
-    ];
-    refused(&[&apply[..], &["photo.png"]].concat(), "photo.png", read);
-    refused(
-        &[
-            "noise",
-            "calibrate",
-            "f0.png",
-            "f1.png",
-            "f2.png",
-            "-o",
-            "f0.png",
-        ],
+        "noise calibrate f0.png f1.png -o x --report x",
         "f0.png",
-        read,
+        twice,
     );
-    refused(&["noise", "calibrate", ".", "-o", "f0.png"], "f0.png", read);
-    let twice = [
-        "noise",
-        "calibrate",
-        "f0.png",
-        "f1.png",
-        "-o",
-        "x",
-        "--report",
-        "x",
-    ];
-    refused(&twice, "f0.png", "named for two outputs");
     refused(
-        &["cartoon", "photo.png", "out.png", "--edges", "out.png"],
+        "cartoon photo.png out.png --edges out.png",
         "photo.png",
-        "named for two outputs",
+        twice,
     );
-    folder.done(&["cartoon", "photo.png", "control.png"]);
+    folder.succeed("cartoon photo.png control.png");
 }
 
 #[test]
@@ -453,64 +284,31 @@ fn what_a_calibration_cannot_use_is_named() {
     for f in 0..3 {
         noisy(&folder, &format!("f{f}.png"), 140.0, 3.0, 100 + f);
     }
-    let refused = |frames: &[&str], said: &str| {
-        let arguments = [&["noise", "calibrate", "-o", "n.toml"][..], frames].concat();
-        let output = folder.run(&arguments);
-        let message = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?} {message}");
-        assert!(message.contains(said), "{arguments:?} {message}");
+    let refused = |frames: &str, said: &str| {
+        let output = folder.run(&format!("noise calibrate -o n.toml {frames}"));
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{frames} {message}");
+        assert!(message.contains(said), "{frames} {message}");
         assert!(!folder.path("n.toml").exists());
     };
-    refused(&["f0.png", "f1.png", "./f0.png"], "named twice");
-    refused(&["."; 2], "named twice");
-    refused(&["nope.png", "f0.png"], "nope.png: it cannot be read");
-    refused(&["--from=-1,-1"], "--from");
-    refused(&["--from", "1e4,1e4"], "from 0 to 255 DN");
-    folder.done(&[
-        "noise",
-        "calibrate",
-        "-o",
-        "n.toml",
-        "f0.png",
-        "f1.png",
-        "f2.png",
-    ]);
+    refused("f0.png f1.png ./f0.png", "named twice");
+    refused(". .", "named twice");
+    refused("nope.png f0.png", "nope.png: it cannot be read");
+    refused("--from=-1,-1", "--from");
+    refused("--from 1e4,1e4", "from 0 to 255 DN");
+    folder.succeed("noise calibrate -o n.toml f0.png f1.png f2.png");
 }
 
 #[test]
 fn textures_beyond_all_memory_are_refused() {
     let folder = Folder::new();
     layers(&folder);
-    folder.done(&[
-        "noise",
-        "calibrate",
-        "--from",
-        "0.02,2",
-        "--bins",
-        "256",
-        "-o",
-        "noise.toml",
-    ]);
-    let apply = |more: &[&str]| {
-        let fixed = [
-            "noise",
-            "apply",
-            "photo.png",
-            "layer.png",
-            "mask.png",
-            "--profile",
-            "noise.toml",
-            "-o",
-            "out.png",
-        ];
-        folder.run(&[&fixed[..], &["--method", "textures"], more].concat())
+    folder.succeed("noise calibrate --from 0.02,2 --bins 256 -o noise.toml");
+    let apply = |texture_size: u32| {
+        folder.run(&format!(
+            "{APPLY} noise.toml -o out.png --method textures --texture-size {texture_size}"
+        ))
     };
-    let output = apply(&["--texture-size", "4096"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("texels in all"));
-    assert_eq!(
-        apply(&["--texture-size", "64"]).status.code(),
-        Some(0),
-        "control"
-    );
+    assert_refused(&apply(4096), "texels in all");
+    assert_eq!(apply(64).status.code(), Some(0), "control");
 }

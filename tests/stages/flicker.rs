@@ -4,7 +4,7 @@ use mixray::scene::CartoonSettings;
 use mixray::stages::EncodedImage;
 use mixray::stages::cartoon::cartoon;
 
-use super::support::Rng;
+use crate::support::Random;
 
 const WIDTH: u32 = 320;
 const HEIGHT: u32 = 240;
@@ -31,7 +31,7 @@ fn scene(x: u32, y: u32) -> [f64; 3] {
     rgb
 }
 
-fn frame(rng: &mut Rng, sigma: f64) -> EncodedImage {
+fn frame(rng: &mut Random, sigma: f64) -> EncodedImage {
     let rgb = (0..WIDTH * HEIGHT)
         .map(|i| {
             scene(i % WIDTH, i / WIDTH)
@@ -47,7 +47,7 @@ fn frame(rng: &mut Rng, sigma: f64) -> EncodedImage {
 
 /// Share of edge pixels (in either frame) that change from frame to frame.
 fn flicker(settings: &CartoonSettings, sigma: f64) -> f64 {
-    let mut rng = Rng(8);
+    let mut rng = Random(8);
     let edges: Vec<Vec<bool>> = (0..5)
         .map(|_| {
             let edges = cartoon(&frame(&mut rng, sigma), settings, true)

@@ -6,7 +6,8 @@ use mixray::scene::{NoiseFit, NoiseMethod, NoiseProfile, NoiseSettings};
 use mixray::stages::calibration::{calibrate, group_frames};
 use mixray::stages::noise::{NoiseInput, NoiseStage, autocorrelation_of, fit_kernel};
 
-use super::support::{Folder, Rng, spread};
+use super::spread;
+use crate::support::{Folder, Random, largest};
 
 /// A grey ramp over all levels, linear.
 fn ramp(width: u32, height: u32) -> Picture {
@@ -194,7 +195,7 @@ fn mixed_pixels_have_one_noise_level() {
         },
         4,
     );
-    let mut rng = Rng(11);
+    let mut rng = Random(11);
     // Columns: photograph, soft edge, card, shadow (ratio 0.5), all over a noisy grey photograph.
     let photo: Vec<[f32; 3]> = (0..width * height)
         .map(|_| {
@@ -295,11 +296,7 @@ fn noise_is_the_same_for_any_number_of_threads() {
 fn the_fitted_kernel_meets_the_measured_lags() {
     let lags = profile().autocorrelation[0];
     let fitted = autocorrelation_of(&fit_kernel(&lags));
-    let worst = lags
-        .iter()
-        .flatten()
-        .zip(fitted.iter().flatten())
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f64::max);
+    let pairs = lags.iter().flatten().zip(fitted.iter().flatten());
+    let worst = largest(pairs.map(|(a, b)| a - b));
     assert!(worst < 0.01, "{worst}");
 }

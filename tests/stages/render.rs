@@ -1,6 +1,7 @@
 //! The stages of a scene file, on films.
 
-use super::support::{Folder, Rng, open, spread};
+use super::spread;
+use crate::support::{Folder, Random, stderr};
 
 const WIDTH: u32 = 160;
 const HEIGHT: u32 = 240;
@@ -9,7 +10,7 @@ const LEVEL: f64 = 90.0;
 
 /// A defocused grey card over half of a noisy grey photograph; a constant environment, so that the card has one brightness.
 fn card(folder: &Folder, more: &str) {
-    let mut rng = Rng(3);
+    let mut rng = Random(3);
     let values: Vec<u8> = (0..3 * WIDTH * HEIGHT)
         .map(|_| (LEVEL + SIGMA * rng.normal()).round() as u8)
         .collect();
@@ -17,7 +18,7 @@ fn card(folder: &Folder, more: &str) {
         let i = 3 * (y * WIDTH + x) as usize;
         [values[i], values[i + 1], values[i + 2]]
     });
-    folder.done(&[
+    folder.succeed(&[
         "noise",
         "calibrate",
         "--from",
@@ -81,14 +82,14 @@ fn parts(picture: &image::RgbImage, reference: &image::RgbImage) -> [f64; 4] {
 fn the_noise_level_is_one_across_a_soft_edge() {
     let folder = Folder::new();
     card(&folder, "rays_per_pixel = 256\n");
-    folder.done(&["render", "scene.toml", "-o", "off.png"]);
+    folder.succeed("render scene.toml -o off.png");
     card(
         &folder,
         "rays_per_pixel = 256\n[noise]\nprofile = \"noise.toml\"\n",
     );
-    folder.done(&["render", "scene.toml", "-o", "on.png"]);
-    folder.done(&["render", "scene.toml", "-o", "next.png", "--frame", "1"]);
-    let (off, on) = (open(&folder.path("off.png")), open(&folder.path("on.png")));
+    folder.succeed("render scene.toml -o on.png");
+    folder.succeed("render scene.toml -o next.png --frame 1");
+    let (off, on) = (folder.open("off.png"), folder.open("on.png"));
     let (without, with) = (parts(&off, &off), parts(&on, &off));
     eprintln!(
         "photograph, darker half, lighter half of the edge, card: {without:.2?} DN without the stage, {with:.2?} DN with it"
@@ -99,7 +100,7 @@ fn the_noise_level_is_one_across_a_soft_edge() {
     assert!(without[3] < 0.3 * without[0], "control: {without:.3?}");
     assert_ne!(
         on,
-        open(&folder.path("next.png")),
+        folder.open("next.png"),
         "frames have noise of their own"
     );
     for x in 0..20 {
@@ -125,8 +126,8 @@ fn the_quotients_noise_does_not_depend_on_the_exposure() {
              backend = \"cpu\"\nrays_per_pixel = 64\nmax_bounces = 1\ncomposite = \"quotient\"\n{noise}"
         );
         folder.write("scene.toml", &scene);
-        folder.done(&["render", "scene.toml", "-o", "out.png"]);
-        let picture = open(&folder.path("out.png"));
+        folder.succeed("render scene.toml -o out.png");
+        let picture = folder.open("out.png");
         // Of neighbours: the shadow is smooth.
         let differences: Vec<f64> = (0..HEIGHT)
             .flat_map(|y| (1..WIDTH).map(move |x| (x, y)))
@@ -154,22 +155,16 @@ fn antialiasing_works_on_one_ray_and_is_off_on_many() {
     let folder = Folder::new();
     let sharp = "rays_per_pixel = 1\n";
     card(&folder, sharp);
-    folder.done(&["render", "scene.toml", "-o", "hard.png"]);
+    folder.succeed("render scene.toml -o hard.png");
     card(&folder, &format!("{sharp}[antialias]\nbeta = 0.8\n"));
-    folder.done(&["render", "scene.toml", "-o", "blended.png"]);
-    assert_ne!(
-        open(&folder.path("hard.png")),
-        open(&folder.path("blended.png"))
-    );
+    folder.succeed("render scene.toml -o blended.png");
+    assert_ne!(folder.open("hard.png"), folder.open("blended.png"));
     card(&folder, "rays_per_pixel = 16\n[antialias]\n");
-    let output = folder.run(&["render", "scene.toml", "-o", "soft.png"]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("[antialias] is off"));
+    let output = folder.run("render scene.toml -o soft.png");
+    assert!(stderr(&output).contains("[antialias] is off"));
     card(&folder, "rays_per_pixel = 16\n");
-    folder.done(&["render", "scene.toml", "-o", "plain.png"]);
-    assert_eq!(
-        open(&folder.path("soft.png")),
-        open(&folder.path("plain.png"))
-    );
+    folder.succeed("render scene.toml -o plain.png");
+    assert_eq!(folder.open("soft.png"), folder.open("plain.png"));
 }
 
 #[test]
@@ -179,19 +174,12 @@ fn the_cartoon_takes_photograph_and_virtual_things_alike() {
         &folder,
         "rays_per_pixel = 4\n[cartoon]\nshrunk_width = 80\nshrunk_height = 120\n",
     );
-    folder.done(&["render", "scene.toml", "-o", "render.png"]);
+    folder.succeed("render scene.toml -o render.png");
     card(&folder, "rays_per_pixel = 4\n");
-    folder.done(&[
-        "render",
-        "scene.toml",
-        "-o",
-        "plain.png",
-        "--png-bits",
-        "16",
-    ]);
-    folder.done(&["cartoon", "plain.png", "after.png", "--shrunk", "80x120"]);
+    folder.succeed("render scene.toml -o plain.png --png-bits 16");
+    folder.succeed("cartoon plain.png after.png --shrunk 80x120");
     let (render, after) = (
-        open(&folder.path("render.png")),
+        folder.open("render.png"),
         image::open(folder.path("after.png")).unwrap().into_rgb8(),
     );
     let apart = render
@@ -200,7 +188,7 @@ fn the_cartoon_takes_photograph_and_virtual_things_alike() {
         .flat_map(|(a, b)| (0..3).map(move |c| a.0[c].abs_diff(b.0[c])))
         .max();
     assert!(apart <= Some(1), "{apart:?}");
-    assert_ne!(render, open(&folder.path("plain.png")), "control");
+    assert_ne!(render, folder.open("plain.png"), "control");
 }
 
 #[test]
@@ -233,7 +221,7 @@ fn tables_that_cannot_be_meant_are_refused() {
         ("[antialias]\nbeta = 2\n", "beta"),
     ] {
         card(&folder, &format!("rays_per_pixel = 1\n{table}"));
-        folder.refused(&["render", "scene.toml"], part);
-        folder.refused(&["render", "scene.toml"], "scene.toml:");
+        folder.refuse("render scene.toml", part);
+        folder.refuse("render scene.toml", "scene.toml:");
     }
 }

@@ -1,6 +1,6 @@
 //! A law measured: all sizes in turns, the least of the runs.
 
-use cpu_time::ProcessTime;
+use crate::clock::ProcessorTime;
 use glam::Vec3;
 
 use super::scenes::{Step, ball, steps, triangle_counts};
@@ -122,12 +122,12 @@ fn build_curve(
 }
 
 fn build_secs(mesh: &[[Vec3; 3]]) -> Result<f64, MeasureError> {
-    let start = ProcessTime::now();
+    let start = ProcessorTime::now();
     let mut builds = 0;
     loop {
         WorldBvh::build(mesh, 0).map_err(PackError::from)?;
         builds += 1;
-        let secs = start.elapsed().as_secs_f64();
+        let secs = start.elapsed_secs();
         if secs >= LEAST_BUILD_SECS {
             return Ok(secs / f64::from(builds));
         }

@@ -247,7 +247,7 @@ fn panel(side: u32) -> Vec<Light> {
 mod tests {
     use super::*;
     use crate::film::Film;
-    use crate::renderer::{Budget, Renderer, RendererOptions};
+    use crate::renderer::{Budget, Renderer, RendererOptions, Watcher};
     use crate::scene::Choice;
 
     #[test]
@@ -264,10 +264,11 @@ mod tests {
 
     /// Covered fraction, and mean magnitude of the picture: over black, shadows are below 0.
     fn shown(step: Step) -> (f64, f64) {
-        let mut renderer = Renderer::new(step.scene, RendererOptions::default()).unwrap();
-        renderer.set_samples(64, 7).unwrap();
+        let mut renderer =
+            Renderer::new(step.scene, RendererOptions::default(), &Watcher::none()).unwrap();
+        renderer.set_samples(64, 7, &Watcher::none()).unwrap();
         renderer
-            .advance(Budget::Complete, &|| false, &mut |_| ())
+            .advance(Budget::Complete, &Watcher::none())
             .unwrap();
         let film: &Film = renderer.film();
         let pixels = film.pixels.len() as f64;

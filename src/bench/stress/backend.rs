@@ -10,10 +10,9 @@ use crate::film::{Film, Picture, composite};
 use crate::gpu::harness::Probe;
 use crate::gpu::{Features, GpuBackend, GpuDevice, GpuError, SceneBuffers, SceneParts};
 use crate::packed::Frame;
-use crate::renderer::{
-    Budget, Cancel, Pass, RayTotals, RenderError, Renderer, RendererOptions, Skip,
-};
+use crate::renderer::{Budget, RayCounts, RenderError, Renderer, RendererOptions, Skip, Watcher};
 use crate::scene::{BackendChoice, Scene};
+use crate::work::WorkList;
 
 /// A case that could not be measured at all.
 #[derive(Debug, thiserror::Error)]
@@ -89,10 +88,10 @@ impl Backend {
             without: [Skip::Plan].into_iter().collect(),
             ..RendererOptions::default()
         };
-        let mut renderer = Renderer::new(scene, options)?;
+        let mut renderer = Renderer::new(scene, options, &Watcher::none())?;
         let film = match self {
             Self::Cpu => {
-                renderer.advance(Budget::Complete, &|| false, &mut |_| ())?;
+                renderer.advance(Budget::Complete, &Watcher::none())?;
                 renderer.film().clone()
             }
             Self::Gpu(gpu) => gpu.film(&renderer, samples)?,
@@ -156,15 +155,12 @@ impl Gpu {
             }
         };
         let mut film = Film::new(packed.frame.width, packed.frame.height, first, false);
-        for pass in [Pass::Main { end }, Pass::Real { everywhere: false }] {
-            self.compiled[at].1.render_pass(
-                packed,
-                &mut film,
-                pass,
-                &Cancel::new(&|| false, None),
-                &mut RayTotals::default(),
-            )?;
-        }
+        let backend = &mut self.compiled[at].1;
+        let (mut rays, infos) = (RayCounts::default(), &packed.pixels);
+        let main = WorkList::main(infos, &film, |_| end);
+        backend.render(&mut film, &main, &mut rays, &Watcher::none())?;
+        let real = WorkList::real(infos, &film, false, |_| end);
+        backend.render(&mut film, &real, &mut rays, &Watcher::none())?;
         Ok(film)
     }
 }

@@ -7,7 +7,8 @@ use serde::Serialize;
 use super::command_line;
 use crate::bench::{Axis, FORMAT, Machine, Plot, Report, Shot, Truth, csv, page, plots};
 use crate::cli::{Failure, say};
-use crate::output::{write_bytes, write_text};
+use crate::decode::{self, MAX_TEXT_BYTES};
+use crate::output::quick::{write_bytes, write_text};
 use crate::scene::Composite;
 
 /// All that a scene's pictures are shown with.
@@ -69,7 +70,8 @@ pub(super) fn write_pictures(
 }
 
 pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|error| Failure(format!("{}: {error}", path.display())))
+    decode::read_text(path, MAX_TEXT_BYTES)
+        .map_err(|reason| Failure(format!("{}: {reason}", path.display())))
 }
 
 pub(super) fn read_report(path: &Path) -> Result<Report, Failure> {

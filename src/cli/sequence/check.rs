@@ -11,6 +11,7 @@ use super::Arguments;
 use super::plan::{Files, known_rate, views};
 use crate::camera::lens::{camera_project, frame_camera, project};
 use crate::cli::{Failure, Outcome, print};
+use crate::decode::{MAX_TEXT_BYTES, read_text};
 use crate::packed::Frame;
 use crate::scene::trajectory::{EntryKey, FrameName, KnownPoint, Trajectory};
 use crate::scene::{Camera, Lens};
@@ -183,9 +184,9 @@ fn frame_of(key: &EntryKey, trajectory: &Trajectory) -> FrameName {
 fn read_points(path: &Path) -> Result<Vec<KnownPoint>, Failure> {
     let failure =
         |line: usize, problem: String| Failure(format!("{}:{line}: {problem}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|error| {
+    let text = read_text(path, MAX_TEXT_BYTES).map_err(|reason| {
         Failure(format!(
-            "{}: it cannot be read ({error}); expected a table of points; correct the path",
+            "{}: it cannot be read ({reason}); expected a table of points; correct the path",
             path.display()
         ))
     })?;

@@ -1,6 +1,5 @@
 //! The frames one after the other.
 
-use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
@@ -11,10 +10,13 @@ use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
 use super::report::{Frames, Seconds, Stats};
 use crate::cli::progress::Steps;
 use crate::cli::render::say_idle;
+use crate::cli::terminal::print_aside;
 use crate::cli::{Failure, Outcome, interrupt, print, say};
 use crate::output::{check_writable, write_text};
 use crate::packed::next_anchor;
-use crate::renderer::{Budget, FrameEdit, PreviousView, RayTotals, Renderer, RendererOptions};
+use crate::renderer::{
+    Budget, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
+};
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{
     BackendChoice, Camera, Exposure, Lens, MotionBlurMethod, Scene, fingerprint_of,
@@ -35,7 +37,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
                 .to_owned(),
         )
     })?;
-    refuse_same_place(frames, output)?;
     if let Some(path) = &arguments.flags.stats {
         check_writable(path)?;
     }
@@ -43,13 +44,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let rate = known_rate(arguments, &files.trajectory, Some(&source));
     let views = views(&files.trajectory, rate, source.is_stream())?;
     check_frames(arguments, &source, &views)?;
-    let count = source.names().map(|names| {
+    let names: Option<Vec<FrameName>> = source.names().map(|names| {
         names
-            .iter()
+            .into_iter()
             .filter(|name| in_range(arguments, name))
-            .count()
+            .collect()
     });
-    if let (Some((from, to)), None) = (arguments.focus_pull, &count)
+    if let (Some((from, to)), None) = (arguments.focus_pull, &names)
         && arguments.range.is_none()
     {
         return Err(Failure(format!(
@@ -57,18 +58,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         )));
     }
     let interrupted = interrupt::watch()?;
-    let bar = Steps::new(count.unwrap_or(0) as u64);
+    let names = names.unwrap_or_default();
+    let bar = Steps::new(names.len() as u64);
     let mut sequence = Sequence {
         arguments,
         files: &files,
         views: &views,
         rate,
         span: span(arguments, &source),
+        names,
         output,
         started: None,
         frames: Frames::default(),
         seconds: Seconds::default(),
-        rays: RayTotals::default(),
+        rays: RayCounts::default(),
         non_finite_samples: 0,
     };
     let outcome = loop {
@@ -105,20 +108,6 @@ fn span(arguments: &Arguments, source: &FrameSource) -> Option<(u32, u32)> {
     Some((names.first()?.number, names.last()?.number))
 }
 
-fn refuse_same_place(frames: &Path, output: &Path) -> Result<(), Failure> {
-    let same = match (frames.canonicalize(), output.canonicalize()) {
-        (Ok(frames), Ok(output)) => frames == output,
-        _ => false,
-    };
-    if !same {
-        return Ok(());
-    }
-    Err(Failure(format!(
-        "{}: the frames would be replaced; expected another place for the output; give another -o",
-        output.display()
-    )))
-}
-
 struct Sequence<'a> {
     arguments: &'a Arguments,
     files: &'a Files,
@@ -126,11 +115,13 @@ struct Sequence<'a> {
     /// Frames a second, where known.
     rate: Option<f64>,
     span: Option<(u32, u32)>,
+    /// The frames to come, where they are known.
+    names: Vec<FrameName>,
     output: &'a Path,
     started: Option<Started>,
     frames: Frames,
     seconds: Seconds,
-    rays: RayTotals,
+    rays: RayCounts,
     non_finite_samples: u64,
 }
 
@@ -180,7 +171,7 @@ impl Sequence<'_> {
             // The same for every frame whichever run renders it.
             started.anchor = Some(next_anchor(started.anchor, position));
         }
-        let there = started.sink.has(name);
+        let there = started.sink.has(name, &frame)?;
         let Some(world_from_camera) = view.world_from_camera else {
             if there {
                 self.frames.kept += 1;
@@ -224,7 +215,7 @@ impl Sequence<'_> {
                 without: self.arguments.flags.without(),
                 ..RendererOptions::default()
             };
-            let renderer = Renderer::new(scene, options)?;
+            let renderer = Renderer::new(scene, options, &Watcher::none())?;
             say_idle(&renderer, None);
             let seconds = renderer.seconds();
             self.seconds.compile += seconds.compile;
@@ -240,18 +231,21 @@ impl Sequence<'_> {
             return Ok(true);
         };
         let begin = Instant::now();
-        renderer.set_frame(FrameEdit {
-            photo: Some(frame.photo.clone()),
-            camera,
-            lens,
-            camera_path: near,
-            time_secs,
-            seed: started.seed.wrapping_add(name.number),
-            anchor: started.anchor,
-        })?;
+        renderer.set_frame(
+            FrameEdit {
+                photo: Some(frame.photo.clone()),
+                camera,
+                lens,
+                camera_path: near,
+                time_secs,
+                seed: started.seed.wrapping_add(name.number),
+                anchor: started.anchor,
+            },
+            &Watcher::none(),
+        )?;
         self.seconds.edit += begin.elapsed().as_secs_f64();
         let begin = Instant::now();
-        renderer.advance(Budget::Complete, interrupted, &mut |_| ())?;
+        renderer.advance(Budget::Complete, &Watcher::none().cancelled_by(interrupted))?;
         self.seconds.render += begin.elapsed().as_secs_f64();
         if interrupted() {
             return Ok(false);
@@ -311,7 +305,9 @@ impl Sequence<'_> {
         scene.photo = None;
         let arguments = self.arguments;
         let fits = scene.settings.exposure == Exposure::Auto;
-        let scope = match fits || arguments.focus_pull.is_some() {
+        // A file tells by their order which frames it holds.
+        let is_file = self.output.extension().is_some_and(|e| e == "y4m");
+        let scope = match fits || arguments.focus_pull.is_some() || is_file {
             true => format!("{:?} {:?}", arguments.range, self.span),
             false => String::new(),
         };
@@ -338,6 +334,7 @@ impl Sequence<'_> {
             header: header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate)),
             png_bits: arguments.flags.png_bits,
             overwrite: arguments.overwrite,
+            names: self.names.clone(),
         })?;
         Ok(Started {
             sink,
@@ -379,8 +376,8 @@ impl Sequence<'_> {
         }
         let text = stats.text(&self.output.display().to_string());
         if self.output == Path::new("-") {
-            // Standard output is the film. Without a stderr there is nobody to tell.
-            let _ = std::io::stderr().write_all(text.as_bytes());
+            // Standard output is the film.
+            print_aside(&text);
         } else {
             print(&text)?;
         }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use crate::renderer::{RayTotals, Renderer};
+use crate::renderer::{RayCounts, Renderer};
 use crate::stages::StageSeconds;
 
 /// Seconds over all frames, by what they were spent on.
@@ -60,7 +60,7 @@ impl Stats {
     pub(super) fn new(
         frames: Frames,
         seconds: Seconds,
-        rays: RayTotals,
+        rays: RayCounts,
         non_finite_samples: u64,
         renderer: Option<&Renderer>,
     ) -> Self {

@@ -1,20 +1,18 @@
 //! Images and textures.
 
 use std::collections::HashMap;
-use std::io::Cursor;
 use std::sync::Arc;
 
 use gltf::json;
 use gltf::json::texture::{MagFilter, MinFilter, WrappingMode};
 use gltf::json::validation::Checked;
-use image::{ImageFormat, ImageReader, Limits};
 
 use super::container::{clip, malformed, read_uri};
 use super::document::Document;
 use super::{Note, Notes, Problem};
+use crate::decode::{Rgba8, decode_rgba8};
 use crate::scene::{Texture, Wrap};
 
-const MAX_IMAGE_SIDE: u32 = 32_768;
 const MAX_IMAGE_FILE_BYTES: u64 = 1 << 30;
 /// Texels of all textures of one file (4 GiB): a small file can name many images that unpack to a large size.
 const MAX_TEXELS: u64 = 1 << 30;
@@ -108,12 +106,11 @@ impl<'a> Textures<'a> {
             }
             (None, None) => return Err(malformed(&at, "names neither a uri nor a bufferView")),
         };
-        let reader = open_image(bytes).map_err(|reason| malformed(&at, reason))?;
-        let pixels = reader
-            .decode()
-            .map_err(|error| malformed(&at, format!("cannot be decoded: {error}")))?
-            .into_rgba8();
-        let (width, height) = pixels.dimensions();
+        let Rgba8 {
+            width,
+            height,
+            pixels,
+        } = decode_rgba8(bytes).map_err(|reason| malformed(&at, reason))?;
         self.texels += u64::from(width) * u64::from(height);
         if self.texels > MAX_TEXELS {
             return Err(malformed(
@@ -125,29 +122,12 @@ impl<'a> Textures<'a> {
             name,
             width,
             height,
-            rgba8: pixels.pixels().map(|pixel| pixel.0).collect(),
+            rgba8: pixels,
             wrap_u: sampling.wrap_u,
             wrap_v: sampling.wrap_v,
             nearest: sampling.nearest,
         })
     }
-}
-
-fn open_image(bytes: &[u8]) -> Result<ImageReader<Cursor<&[u8]>>, String> {
-    let mut reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|error| error.to_string())?;
-    if !matches!(
-        reader.format(),
-        Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)
-    ) {
-        return Err("is not a PNG, JPEG or WebP image".into());
-    }
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_IMAGE_SIDE);
-    limits.max_image_height = Some(MAX_IMAGE_SIDE);
-    reader.limits(limits);
-    Ok(reader)
 }
 
 /// EXT_texture_webp's image where there is one, else the plain source.

@@ -24,6 +24,7 @@ use glam::{DMat3, DMat4, DQuat, DVec3};
 use super::pose::rigid;
 use super::{Camera, SceneError};
 use crate::camera::lens::check_distortion;
+use crate::decode::{MAX_POSES_BYTES, read_file};
 
 /// Why a trajectory was refused. Displays as one line: "problem; expected ...; how to mend", with the file before it.
 #[derive(Debug, thiserror::Error)]
@@ -188,10 +189,10 @@ impl Trajectory {
 }
 
 fn read_text(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|error| {
+    let bytes = read_file(path, MAX_POSES_BYTES).map_err(|reason| {
         file_error(
             path,
-            format!("it cannot be read ({error}); expected a file of poses; correct the path"),
+            format!("it cannot be read ({reason}); expected a file of poses; correct the path"),
         )
     })?;
     String::from_utf8(bytes).map_err(|_| {

@@ -56,7 +56,7 @@ fn read_source(source: &Source) -> SceneResult<Trajectory> {
 }
 
 fn read_intrinsics(table: &Table) -> SceneResult<Intrinsics> {
-    let side = |node: &Node| node.integer(1, crate::scene::image_file::MAX_SIDE_PX);
+    let side = |node: &Node| node.integer(1, crate::decode::MAX_SIDE_PX);
     let width = table.optional("width", side)?;
     let height = table.optional("height", side)?;
     let fx = table.required("fx", "fx = 520.0", Node::positive)?;

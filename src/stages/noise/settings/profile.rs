@@ -8,6 +8,8 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use crate::decode::{MAX_TEXT_BYTES, read_text};
+
 /// Version of the file format that this program reads and writes.
 pub const NOISE_PROFILE_VERSION: i64 = 1;
 const FORMAT: &str = "mixray noise profile";
@@ -100,8 +102,8 @@ impl NoiseProfile {
 
     /// Reads a profile file. An error reads "problem; expected ...; how to mend" and leaves out the path.
     pub fn read(path: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            format!("it cannot be read ({error}); expected a noise profile; correct the path")
+        let text = read_text(path, MAX_TEXT_BYTES).map_err(|reason| {
+            format!("it cannot be read ({reason}); expected a noise profile; correct the path")
         })?;
         Self::from_toml(&text)
     }

@@ -2,19 +2,19 @@
 
 use std::time::Instant;
 
-use cpu_time::ProcessTime;
+use crate::clock::ProcessorTime;
 
 /// Started when made.
-pub(super) struct Watch {
+pub(super) struct Stopwatch {
     pub begin: Instant,
-    cpu: ProcessTime,
+    cpu: ProcessorTime,
 }
 
-impl Watch {
+impl Stopwatch {
     pub fn start() -> Self {
         Self {
             begin: Instant::now(),
-            cpu: ProcessTime::now(),
+            cpu: ProcessorTime::now(),
         }
     }
 
@@ -25,6 +25,6 @@ impl Watch {
 
     /// Seconds of the processors in all of the process's threads.
     pub fn cpu_secs(&self) -> f64 {
-        self.cpu.elapsed().as_secs_f64()
+        self.cpu.elapsed_secs()
     }
 }

@@ -1,0 +1,371 @@
+//! OpenEXR: the header is read and held against the limits first, then only the channels that are wanted are decoded.
+
+use std::collections::HashSet;
+use std::io::Cursor;
+
+use ::exr::block::UncompressedBlock;
+use ::exr::block::chunk::Chunk;
+use ::exr::block::reader::{ChunksReader, Reader};
+use ::exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, SampleType, Text};
+use ::exr::meta::header::Header;
+use ::exr::prelude::{FlatSamples, Vec2, f16};
+use rayon::prelude::*;
+
+use super::channels::ChannelFile;
+use super::{ImageFile, Pixels, broken, check_size, ensure_memory, guarded};
+
+/// Most channels of a part.
+const MAX_CHANNELS: usize = 1024;
+/// A block takes at least its place in the table, its own place and its length.
+const LEAST_BLOCK_BYTES: usize = 16;
+
+/// The channels of a file's first part.
+pub(super) fn read_channels(bytes: &[u8]) -> Result<ChannelFile, String> {
+    let headers = read_headers(bytes)?;
+    let header = headers.first().ok_or_else(|| broken("it has no part"))?;
+    let (width, height) = size_of(header)?;
+    let mut file = ChannelFile {
+        width,
+        height,
+        ..ChannelFile::default()
+    };
+    let all: Vec<usize> = (0..header.channels.list.len()).collect();
+    for (index, samples) in all.iter().zip(read_part(bytes, &headers, 0, &all)?) {
+        let name = text_of(&header.channels.list[*index].name);
+        match samples {
+            FlatSamples::U32(samples) => {
+                file.counts.insert(name, samples);
+            }
+            floats => {
+                file.floats.insert(name, into_f32(floats));
+            }
+        }
+    }
+    for (name, value) in &header.own_attributes.other {
+        if let AttributeValue::Text(text) = value {
+            file.texts.insert(text_of(name), text_of(text));
+        }
+    }
+    Ok(file)
+}
+
+/// The picture among the parts and layers of a file.
+pub(super) fn read_picture(bytes: &[u8]) -> Result<ImageFile, String> {
+    let headers = read_headers(bytes)?;
+    let (part, rgb) = pick(&headers)?;
+    let header = &headers[part];
+    let window = header.shared_attributes.display_window;
+    let (width, height) = check_size(window.size.x() as u64, window.size.y() as u64)?;
+    let mut warnings = Vec::new();
+    if header
+        .shared_attributes
+        .chromaticities
+        .is_some_and(|c| !is_rec709(&c))
+    {
+        warnings.push("its chromaticities are ignored: it is read as linear Rec.709".to_owned());
+    }
+    if find(header, "A").is_some() {
+        warnings.push("its alpha channel is ignored".to_owned());
+    }
+    let mut wanted = rgb.to_vec();
+    wanted.dedup();
+    ensure_memory((width, height), 12)?;
+    let planes: Vec<Vec<f32>> = read_part(bytes, &headers, part, &wanted)?
+        .into_iter()
+        .map(into_f32)
+        .collect();
+    let data = header.data_window();
+    if data != window {
+        warnings.push(format!(
+            "its data window {} is not its display window {}: it is placed there, the rest is black",
+            shown(data),
+            shown(window)
+        ));
+    }
+    let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
+    for (channel, index) in rgb.into_iter().enumerate() {
+        let plane = wanted.iter().position(|w| *w == index);
+        let plane = plane.map_or(&[][..], |plane| &planes[plane]);
+        place(plane, data, window, |pixel, sample| {
+            pixels[pixel][channel] = sample;
+        });
+    }
+    Ok(ImageFile {
+        width,
+        height,
+        pixels: Pixels::Linear(pixels),
+        warnings,
+    })
+}
+
+/// Each sample of `data` that lies in `window`, with its index there.
+fn place(
+    plane: &[f32],
+    data: IntegerBounds,
+    window: IntegerBounds,
+    mut set: impl FnMut(usize, f32),
+) {
+    let offset = |axis: fn(&Vec2<i32>) -> i32| {
+        i64::from(axis(&data.position)) - i64::from(axis(&window.position))
+    };
+    let (left, top) = (offset(|p| p.0), offset(|p| p.1));
+    let inside = |at: i64, size: usize| usize::try_from(at).ok().filter(|at| *at < size);
+    for (y, row) in plane.chunks_exact(data.size.0).enumerate() {
+        let Some(to_y) = inside(top + y as i64, window.size.1) else {
+            continue;
+        };
+        for (x, sample) in row.iter().enumerate() {
+            if let Some(to_x) = inside(left + x as i64, window.size.0) {
+                set(to_y * window.size.0 + to_x, *sample);
+            }
+        }
+    }
+}
+
+fn shown(window: IntegerBounds) -> String {
+    let (Vec2(x, y), end) = (window.position, window.max());
+    format!("({x}, {y})..({}, {})", end.0, end.1)
+}
+
+/// Names of a layer or part that hold the picture as such.
+const PICTURE_NAMES: [&str; 7] = [
+    "rgba",
+    "rgb",
+    "beauty",
+    "combined",
+    "composite",
+    "color",
+    "main",
+];
+
+/// The part and the channels that are the picture: those without a layer's name; else of a layer that is named so; else the only ones.
+fn pick(headers: &[Header]) -> Result<(usize, [usize; 3]), String> {
+    let mut found: Vec<(String, usize, [usize; 3])> = Vec::new();
+    for (part, header) in headers.iter().enumerate() {
+        let part_name = match (headers.len(), &header.own_attributes.layer_name) {
+            (2.., Some(name)) => text_of(name),
+            _ => String::new(),
+        };
+        for channel in &header.channels.list {
+            let name = text_of(&channel.name);
+            let Some(layer) = name
+                .strip_suffix('R')
+                .filter(|l| l.is_empty() || l.ends_with('.'))
+            else {
+                continue;
+            };
+            let rgb = ["R", "G", "B"].map(|c| find(header, &format!("{layer}{c}")));
+            if let [Some(r), Some(g), Some(b)] = rgb {
+                let names = [part_name.as_str(), layer.trim_end_matches('.')];
+                let whole = names.join(".").trim_matches('.').to_owned();
+                found.push((whole, part, [r, g, b]));
+            }
+        }
+    }
+    let rank = |name: &str| {
+        let last = name.rsplit('.').next().unwrap_or_default();
+        match last.to_ascii_lowercase() {
+            last if last.is_empty() => 0,
+            last if PICTURE_NAMES.contains(&last.as_str()) => 1,
+            _ => 2,
+        }
+    };
+    found.sort_by_key(|(name, part, _)| (rank(name), *part));
+    match found.as_slice() {
+        [(name, part, rgb), rest @ ..] if rank(name) < 2 || rest.is_empty() => Ok((*part, *rgb)),
+        [] => grey(headers).ok_or_else(|| {
+            "it has no channels R, G, B or Y; expected an RGB or grey image; convert it".to_owned()
+        }),
+        several => {
+            let names: Vec<&str> = several.iter().map(|(name, ..)| name.as_str()).collect();
+            Err(format!(
+                "it holds several pictures ({}) and none is named as the one; expected R, G and B without a layer, or one of {}; name it or leave out the others",
+                names.join(", "),
+                PICTURE_NAMES.join(", ")
+            ))
+        }
+    }
+}
+
+/// With RY and BY beside it, Y alone would lose the colour.
+fn grey(headers: &[Header]) -> Option<(usize, [usize; 3])> {
+    headers.iter().enumerate().find_map(|(part, header)| {
+        let grey = find(header, "Y").filter(|_| find(header, "RY").is_none())?;
+        Some((part, [grey; 3]))
+    })
+}
+
+fn find(header: &Header, name: &str) -> Option<usize> {
+    let channels = &header.channels.list;
+    channels.iter().position(|channel| channel.name.eq(name))
+}
+
+/// The headers of a file, each within the limits and not beyond what the file can hold.
+fn read_headers(bytes: &[u8]) -> Result<Vec<Header>, String> {
+    let meta =
+        ::exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
+    let mut blocks = 0_usize;
+    for header in &meta.headers {
+        size_of(header)?;
+        let channels = header.channels.list.len();
+        if !(1..=MAX_CHANNELS).contains(&channels) {
+            return Err(format!(
+                "a part has {channels} channels; expected 1 to {MAX_CHANNELS}; leave out what is not needed"
+            ));
+        }
+        blocks = blocks.saturating_add(header.chunk_count);
+    }
+    if blocks.saturating_mul(LEAST_BLOCK_BYTES) > bytes.len() {
+        return Err(broken(format!(
+            "its header promises {blocks} blocks, more than its {} bytes can hold",
+            bytes.len()
+        )));
+    }
+    Ok(meta.headers.into_iter().collect())
+}
+
+fn size_of(header: &Header) -> Result<(u32, u32), String> {
+    check_size(header.layer_size.x() as u64, header.layer_size.y() as u64)
+}
+
+/// The samples of these channels of a part.
+fn read_part(
+    bytes: &[u8],
+    headers: &[Header],
+    part: usize,
+    wanted: &[usize],
+) -> Result<Vec<FlatSamples>, String> {
+    let header = &headers[part];
+    let size = size_of(header)?;
+    let batch = 2 * rayon::current_num_threads();
+    ensure_part(header, size, wanted, batch)?;
+    let count = size.0 as usize * size.1 as usize;
+    let mut planes: Vec<FlatSamples> = wanted
+        .iter()
+        .map(|index| match header.channels.list[*index].sample_type {
+            SampleType::F16 => FlatSamples::F16(vec![f16::ZERO; count]),
+            SampleType::F32 => FlatSamples::F32(vec![0.0; count]),
+            SampleType::U32 => FlatSamples::U32(vec![0; count]),
+        })
+        .collect();
+    let reader = Reader::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
+    let mut chunks = reader
+        .filter_chunks(false, |_, tile, block| {
+            block.layer == part && tile.level_index == Vec2(0, 0)
+        })
+        .map_err(broken)?;
+    let expected = chunks.expected_chunk_count();
+    let meta = chunks.meta_data().clone();
+    let mut seen = HashSet::new();
+    loop {
+        let compressed: Vec<Chunk> = chunks
+            .by_ref()
+            .take(batch)
+            .collect::<Result<_, _>>()
+            .map_err(broken)?;
+        if compressed.is_empty() {
+            break;
+        }
+        // The crate's own threads would end the program where a decoder panics.
+        let blocks: Vec<UncompressedBlock> = compressed
+            .into_par_iter()
+            .map(|chunk| {
+                guarded(|| UncompressedBlock::decompress_chunk(chunk, &meta, false))
+                    .map_err(broken)?
+                    .map_err(broken)
+            })
+            .collect::<Result<_, String>>()?;
+        for block in &blocks {
+            if block.index.layer != part || block.index.level != Vec2(0, 0) {
+                return Err(broken("a block belongs to another part"));
+            }
+            seen.insert((block.index.pixel_position.0, block.index.pixel_position.1));
+            copy_block(block, header, wanted, &mut planes)?;
+        }
+    }
+    if seen.len() != expected {
+        return Err(broken(format!(
+            "{} of its {expected} blocks are there",
+            seen.len()
+        )));
+    }
+    Ok(planes)
+}
+
+/// Memory for the planes, those that become 32 bits wide once more, and the blocks in work.
+fn ensure_part(
+    header: &Header,
+    size: (u32, u32),
+    wanted: &[usize],
+    batch: usize,
+) -> Result<(), String> {
+    let (lines, columns) = match header.blocks {
+        ::exr::meta::BlockDescription::ScanLines => {
+            (header.compression.scan_lines_per_block(), size.0 as usize)
+        }
+        ::exr::meta::BlockDescription::Tiles(tiles) => (tiles.tile_size.1, tiles.tile_size.0),
+    };
+    let block_pixels = lines.min(size.1 as usize) as u64 * columns.min(size.0 as usize) as u64;
+    let pixels = u64::from(size.0) * u64::from(size.1);
+    let in_work = (batch.min(header.chunk_count) as u64)
+        .saturating_mul(2 * block_pixels * header.channels.bytes_per_pixel as u64);
+    let what = format!(
+        "decoding {} channels of its {} x {} pixels",
+        wanted.len(),
+        size.0,
+        size.1
+    );
+    let needed = (pixels * 6 * wanted.len() as u64).saturating_add(in_work);
+    crate::memory::ensure(needed, &what)
+        .map_err(|shortage| format!("{shortage}; expected a smaller image; resize it"))
+}
+
+fn copy_block(
+    block: &UncompressedBlock,
+    header: &Header,
+    wanted: &[usize],
+    planes: &mut [FlatSamples],
+) -> Result<(), String> {
+    let width = header.layer_size.0;
+    for line in block.lines(&header.channels) {
+        let Some(plane) = wanted.iter().position(|w| *w == line.location.channel) else {
+            continue;
+        };
+        let start = line.location.position.1 * width + line.location.position.0;
+        let range = start..start + line.location.sample_count;
+        match &mut planes[plane] {
+            FlatSamples::F16(samples) => line.read_samples_into_slice(&mut samples[range]),
+            FlatSamples::F32(samples) => line.read_samples_into_slice(&mut samples[range]),
+            FlatSamples::U32(samples) => line.read_samples_into_slice(&mut samples[range]),
+        }
+        .map_err(broken)?;
+    }
+    Ok(())
+}
+
+fn into_f32(samples: FlatSamples) -> Vec<f32> {
+    match samples {
+        FlatSamples::F32(samples) => samples,
+        FlatSamples::F16(samples) => samples.iter().map(|s| s.to_f32()).collect(),
+        FlatSamples::U32(samples) => samples.iter().map(|s| *s as f32).collect(),
+    }
+}
+
+/// UTF-8, which OpenEXR asks for, or else Latin-1, which the `exr` crate writes.
+fn text_of(text: &Text) -> String {
+    match std::str::from_utf8(text.as_slice()) {
+        Ok(utf8) => utf8.to_owned(),
+        Err(_) => text.to_string(),
+    }
+}
+
+fn is_rec709(c: &Chromaticities) -> bool {
+    let given = [
+        c.red.0, c.red.1, c.green.0, c.green.1, c.blue.0, c.blue.1, c.white.0, c.white.1,
+    ];
+    let rec709 = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
+    given
+        .iter()
+        .zip(rec709)
+        .all(|(given, rec709)| (given - rec709).abs() < 1e-3)
+}

@@ -1,0 +1,178 @@
+//! What every driver drives: a scene, its film, and the backend that fills the one from the other.
+
+use std::time::Instant;
+
+use glam::DVec3;
+
+use super::backend::Backend;
+use super::stopwatch::Stopwatch;
+use super::{RenderError, RendererOptions, Seconds, Skip};
+use crate::cpu;
+use crate::film::Film;
+use crate::gpu::GpuError;
+use crate::packed::{PIXEL_OUT_OF_REACH, PackError, PackedScene, PixelInfo};
+use crate::scene::{Composite, Scene};
+use crate::work::{Meter, Phase, Progress, RayCounts, Watcher, WorkList};
+
+pub(super) struct Core {
+    pub scene: Scene,
+    pub packed: PackedScene,
+    pub film: Film,
+    pub backend: Backend,
+    pub options: RendererOptions,
+    pub rays: RayCounts,
+    pub seconds: Seconds,
+    /// Things the user should hear: fallbacks taken, values fitted.
+    pub notes: Vec<String>,
+    /// The picture's time.
+    pub time_secs: f64,
+}
+
+impl Core {
+    /// Packs the whole scene anew, anchored at its camera.
+    pub fn pack(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
+        self.packed = packing(watcher, || PackedScene::build(&self.scene))?;
+        Ok(())
+    }
+
+    /// The same, anchored at a point of the world.
+    pub fn pack_at(&mut self, anchor: DVec3, watcher: &Watcher<'_>) -> Result<(), PackError> {
+        self.packed = packing(watcher, || PackedScene::build_at(&self.scene, anchor))?;
+        Ok(())
+    }
+
+    /// Packs the virtual world anew.
+    pub fn pack_virtual(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
+        packing(watcher, || self.packed.rebuild_virtual(&self.scene))
+    }
+
+    /// Takes the samples of a list. A device that is lost is replaced by the CPU, which takes what is left.
+    pub fn take(&mut self, work: &WorkList, watcher: &Watcher<'_>) -> Result<(), RenderError> {
+        if let Some(gpu) = self.backend.gpu_mut() {
+            match gpu.render(&mut self.film, work, &mut self.rays, watcher) {
+                Err(error @ GpuError::Lost(_)) => {
+                    self.notes.push(format!(
+                        "{error}; the CPU goes on from what was accumulated"
+                    ));
+                    self.backend = Backend::Cpu;
+                    let left = work.left(&self.film);
+                    self.rays += cpu::render::render(&self.packed, &mut self.film, &left, watcher);
+                    return Ok(());
+                }
+                other => return Ok(other?),
+            }
+        }
+        self.rays += cpu::render::render(&self.packed, &mut self.film, work, watcher);
+        Ok(())
+    }
+
+    /// The samples of the main pass that lie before `end_of_row`, in rays per pixel.
+    pub fn main_work(&self, end_of_row: impl Fn(usize) -> u32 + Sync) -> WorkList {
+        WorkList::main(&self.packed.pixels, &self.film, end_of_row)
+    }
+
+    /// The real samples before `end_of_row` that the composite, or a plane, lacks.
+    pub fn real_work(&self, end_of_row: impl Fn(usize) -> u32 + Sync) -> WorkList {
+        let everywhere = self.options.all_planes
+            || self.scene.settings.composite == Composite::Quotient
+            || self.options.without.contains(Skip::EdgeReal);
+        WorkList::real(&self.packed.pixels, &self.film, everywhere, end_of_row)
+    }
+
+    /// True if no pixel is within reach of anything virtual: the picture is the photograph.
+    pub fn nothing_to_trace(&self) -> bool {
+        !self.packed.pixels.iter().any(is_within_reach)
+    }
+
+    /// Rays per pixel that every pixel within reach has taken; `None`: there is no such pixel.
+    pub fn samples(&self) -> Option<u32> {
+        let pixels = self.film.pixels.iter().zip(&self.packed.pixels);
+        pixels
+            .filter(|(_, info)| is_within_reach(info))
+            .map(|(sums, _)| sums.n / sums.sample_factor.max(1))
+            .min()
+    }
+
+    pub fn count_render(&mut self, stopwatch: &Stopwatch) {
+        self.seconds.render += stopwatch.secs();
+        self.seconds.cpu += stopwatch.cpu_secs();
+    }
+}
+
+/// Tells the watcher that trees are built.
+pub(super) fn packing<T>(
+    watcher: &Watcher<'_>,
+    pack: impl FnOnce() -> Result<T, PackError>,
+) -> Result<T, PackError> {
+    let meter = Meter::begin(watcher, Phase::Trees, 1);
+    let packed = pack()?;
+    meter.end();
+    Ok(packed)
+}
+
+pub(super) fn is_within_reach(info: &PixelInfo) -> bool {
+    info.flags & PIXEL_OUT_OF_REACH == 0
+}
+
+/// Main passes on their way to an end, as a watcher hears of them.
+pub(super) struct Way<'a> {
+    watcher: Watcher<'a>,
+    begin: Instant,
+    /// Samples of all pixels.
+    taken: u64,
+    wanted: u64,
+    /// Rays per pixel that every pixel has taken, and all of them.
+    pub samples: u32,
+    samples_total: u32,
+}
+
+impl<'a> Way<'a> {
+    /// From where the film stands to `end`, in rays per pixel.
+    pub fn to(end: u32, core: &Core, watcher: &Watcher<'a>) -> Self {
+        let (mut taken, mut wanted) = (0, 0);
+        let samples_total = end - core.film.first_sample;
+        for (sums, info) in core.film.pixels.iter().zip(&core.packed.pixels) {
+            if is_within_reach(info) {
+                taken += u64::from(sums.n);
+                wanted += u64::from(samples_total) * u64::from(sums.sample_factor.max(1));
+            }
+        }
+        Self {
+            watcher: *watcher,
+            begin: Instant::now(),
+            taken,
+            wanted,
+            samples: core.samples().unwrap_or(samples_total),
+            samples_total,
+        }
+    }
+
+    /// Takes the samples of a list; false if the watcher did not wait for all of them.
+    pub fn take(&mut self, core: &mut Core, work: &WorkList) -> Result<bool, RenderError> {
+        let from = self.progress(core);
+        let samples = work.samples();
+        self.taken += samples;
+        let meter = Meter::part(&self.watcher, from, self.share(), samples);
+        core.take(work, &self.watcher.metered(&meter))?;
+        Ok(!self.watcher.is_cancelled())
+    }
+
+    pub fn tell(&self, core: &Core) {
+        self.watcher.hear(&self.progress(core));
+    }
+
+    fn share(&self) -> f64 {
+        self.taken as f64 / self.wanted.max(1) as f64
+    }
+
+    fn progress(&self, core: &Core) -> Progress {
+        Progress {
+            phase: Phase::Rendering,
+            share_done: self.share(),
+            elapsed: self.begin.elapsed(),
+            samples: self.samples,
+            samples_total: self.samples_total,
+            rays: core.rays,
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! The driver of a scene whose objects move while the shutter is open.
+//!
+//! Moving objects stand still from one instant to the next: the virtual world is packed anew for each, and every row takes at an instant the
+//! samples that fall into it, so that a pixel's samples follow one another in time. (A moving camera is part of each camera ray.)
+
+use super::RenderError;
+use super::core::{Core, Way};
+use crate::gpu::Changed;
+use crate::packed::{Instant, row_ends};
+use crate::work::{Watcher, WorkList};
+
+pub(super) struct Moving {
+    /// Where the objects stand, one after the other; never empty.
+    pub instants: Vec<Instant>,
+}
+
+impl Moving {
+    /// Takes the samples before `end` of those before `end_of_all`, both in rays per pixel, and what edge pixels then lack. With a readout time
+    /// an instant has samples of other numbers in every row, so that every instant is asked, whatever was taken before.
+    pub fn advance(
+        &self,
+        core: &mut Core,
+        end: u32,
+        end_of_all: u32,
+        watcher: &Watcher<'_>,
+    ) -> Result<(), RenderError> {
+        let mut way = Way::to(end_of_all, core, watcher);
+        for instant in &self.instants {
+            if watcher.is_cancelled() {
+                break;
+            }
+            let ends = ends_of(core, instant);
+            let work = core.main_work(|row| ends[row].min(end));
+            if work.is_empty() {
+                continue;
+            }
+            stand_at(core, instant)?;
+            if !way.take(core, &work)? {
+                break;
+            }
+            way.samples = core.samples().unwrap_or(end_of_all);
+            way.tell(core);
+        }
+        self.replay_real(core)
+    }
+
+    /// What edge pixels lack, each sample at its own instant; not cancelled.
+    pub fn replay_real(&self, core: &mut Core) -> Result<(), RenderError> {
+        let end = core.scene.settings.rays_per_pixel;
+        let mut lacking = core.real_work(|_| end).samples();
+        for instant in &self.instants {
+            if lacking == 0 {
+                break;
+            }
+            let ends = ends_of(core, instant);
+            let work: WorkList = core.real_work(|row| ends[row]);
+            if work.is_empty() {
+                continue;
+            }
+            stand_at(core, instant)?;
+            core.take(&work, &Watcher::none())?;
+            lacking -= work.samples();
+        }
+        core.scene.set_time(core.time_secs);
+        Ok(())
+    }
+}
+
+/// By row, the samples before the end of an instant, in rays per pixel.
+fn ends_of(core: &Core, instant: &Instant) -> Vec<u32> {
+    row_ends(&core.scene, instant, core.scene.settings.rays_per_pixel)
+}
+
+/// Moves the virtual world to where it is at an instant.
+fn stand_at(core: &mut Core, instant: &Instant) -> Result<(), RenderError> {
+    core.scene.set_time(instant.time_secs);
+    core.packed.rebuild_virtual(&core.scene)?;
+    core.backend.update(&core.packed, Changed::Virtual)?;
+    Ok(())
+}

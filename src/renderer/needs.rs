@@ -1,0 +1,64 @@
+//! What a render will take, held against the memory that there is before it is taken.
+
+use crate::film::{GuideSums, PixelSums};
+use crate::memory::{Shortage, ensure, ensure_lazy};
+use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
+use crate::scene::{EnvironmentMap, Scene};
+
+/// Of a triangle at least, in the packed scene and its tree, while the tree is built.
+const TRIANGLE_BYTES: u64 = 300;
+/// Of an environment's texel: packed, and in its tables.
+const ENVIRONMENT_TEXEL_BYTES: u64 = 20;
+/// Of a pixel: the plan, the composite in linear light, and its codes.
+const PICTURE_BYTES: u64 = size_of::<PixelInfo>() as u64 + 12 + 6;
+/// Of a pixel of the planes of an EXR file: computed, and once more as channels.
+const PLANES_BYTES: u64 = 29 * 4 * 2;
+
+/// Before the scene is packed.
+pub(super) fn ensure_scene(scene: &Scene, all_planes: bool) -> Result<(), Shortage> {
+    let triangles = |count: u64| {
+        ensure(
+            count * TRIANGLE_BYTES,
+            &format!("a scene of {count} triangles"),
+        )
+    };
+    triangles(
+        (scene.objects.iter().flat_map(|object| &object.instances))
+            .map(|instance| instance.primitive.triangles.len() as u64)
+            .sum(),
+    )?;
+    if let Some(EnvironmentMap::LatLong { texels, .. }) = scene.environment.as_ref().map(|e| &e.map)
+    {
+        let bytes = texels.len() as u64 * ENVIRONMENT_TEXEL_BYTES;
+        ensure(bytes, "the environment")?;
+    }
+    let (width, height) = (scene.camera.width, scene.camera.height);
+    let pixels = u64::from(width) * u64::from(height);
+    let shown = pixels * (PICTURE_BYTES + if all_planes { PLANES_BYTES } else { 0 });
+    let mapped = shown + pixels * film_bytes(all_planes);
+    ensure_lazy(mapped, shown, &picture(width, height))
+}
+
+/// Before the film is made: of its pixels only those within reach are ever written.
+pub(super) fn ensure_film(packed: &PackedScene, all_planes: bool) -> Result<(), Shortage> {
+    let within_reach = (packed.pixels.iter())
+        .filter(|pixel| pixel.flags & PIXEL_OUT_OF_REACH == 0)
+        .count() as u64;
+    let (width, height) = (packed.frame.width, packed.frame.height);
+    let mapped = packed.pixels.len() as u64 * film_bytes(all_planes);
+    let touched = within_reach * film_bytes(all_planes);
+    ensure_lazy(mapped, touched, &picture(width, height))
+}
+
+fn film_bytes(all_planes: bool) -> u64 {
+    let guides = if all_planes {
+        size_of::<GuideSums>()
+    } else {
+        0
+    };
+    (size_of::<PixelSums>() + guides) as u64
+}
+
+fn picture(width: u32, height: u32) -> String {
+    format!("a picture of {width} x {height} pixels")
+}

@@ -1,0 +1,114 @@
+//! What precedes the first sample: after the scene is packed, or after an edit.
+
+use super::backend::Backend;
+use super::stopwatch::Stopwatch;
+use super::{RenderError, Renderer, photo_albedo};
+use crate::cpu;
+use crate::film::Film;
+use crate::gpu::Changed;
+use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO};
+use crate::scene::{BackendChoice, Exposure};
+use crate::work::{Meter, Phase, Watcher};
+
+impl Renderer {
+    /// Takes up the packed scene after an edit.
+    pub(super) fn restart(
+        &mut self,
+        real_light_changed: bool,
+        changed: Changed,
+        watcher: &Watcher<'_>,
+    ) -> Result<(), RenderError> {
+        let stopwatch = Stopwatch::start();
+        let look_ahead = self.core.seconds.look_ahead;
+        if real_light_changed {
+            self.prepare_photo(watcher);
+        }
+        let swept = self.prepare_shutter()?;
+        self.look_ahead(watcher);
+        let core = &mut self.core;
+        let changed = match changed {
+            Changed::View if swept => Changed::Virtual,
+            changed => changed,
+        };
+        core.backend.update(&core.packed, changed)?;
+        core.seconds.build += stopwatch.secs() - (core.seconds.look_ahead - look_ahead);
+        self.open_backend(watcher)
+    }
+
+    /// Opens the backend once there is something to trace.
+    pub(super) fn open_backend(&mut self, watcher: &Watcher<'_>) -> Result<(), RenderError> {
+        let core = &mut self.core;
+        let choice = core.scene.settings.backend;
+        let may_wait = choice == BackendChoice::Auto && core.nothing_to_trace();
+        if !core.backend.is_undecided() || may_wait {
+            return Ok(());
+        }
+        let stopwatch = Stopwatch::start();
+        let watcher = match choice {
+            BackendChoice::Cpu => &Watcher::none(),
+            BackendChoice::Gpu | BackendChoice::Auto => watcher,
+        };
+        let meter = Meter::begin(watcher, Phase::Kernels, 1);
+        let (backend, note) = Backend::open(choice, &core.packed, core.options.without)?;
+        core.backend = backend;
+        core.notes.extend(note);
+        core.seconds.compile += stopwatch.secs();
+        meter.end();
+        Ok(())
+    }
+
+    /// What follows from the real world and its light: exposure, and albedo from the photograph.
+    pub(super) fn prepare_photo(&mut self, watcher: &Watcher<'_>) {
+        let core = &mut self.core;
+        if core.options.all_planes {
+            core.packed.frame.flags |= FRAME_AOVS;
+        }
+        let from_photo = (core.packed.materials.iter())
+            .any(|material| material.flags & MATERIAL_PHOTO_ALBEDO != 0);
+        let Some(photo) = &core.scene.photo else {
+            return;
+        };
+        if core.scene.settings.exposure == Exposure::Auto {
+            match photo_albedo::fit_exposure_ev(&mut core.packed, photo, watcher) {
+                Some(ev) => {
+                    core.packed.frame.exposure_scale = ev.exp2() as f32;
+                    core.notes.push(format!(
+                        "exposure_ev = {ev:.3} fits the proxy's light to the photograph"
+                    ));
+                }
+                None => core.notes.push(
+                    "exposure_ev = \"auto\": the camera sees no lit proxy; 0 is used".to_owned(),
+                ),
+            }
+        }
+        if from_photo {
+            photo_albedo::estimate_photo_albedo(&mut core.packed, photo, watcher);
+        }
+    }
+
+    /// Runs the pilot and begins the film that follows its plan.
+    pub(super) fn look_ahead(&mut self, watcher: &Watcher<'_>) {
+        let stopwatch = Stopwatch::start();
+        let meter = Meter::begin(watcher, Phase::LookingAhead, 1);
+        self.stated = None;
+        let core = &mut self.core;
+        let without = core.options.without;
+        without.apply_to_frame(&mut core.packed.frame);
+        cpu::pilot(&mut core.packed);
+        without.apply_to_pixels(&mut core.packed.pixels);
+        core.film = Film::new(
+            core.film.width,
+            core.film.height,
+            core.film.first_sample,
+            core.options.all_planes,
+        );
+        let factors = core.packed.pixels.iter().map(|p| p.sample_factor);
+        core.film.set_sample_factors(factors);
+        if core.options.filter {
+            self.surfaces = cpu::diffuse_surfaces(&core.packed);
+        }
+        core.seconds.look_ahead += stopwatch.secs();
+        core.seconds.cpu += stopwatch.cpu_secs();
+        meter.end();
+    }
+}
