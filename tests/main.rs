@@ -6,6 +6,7 @@ mod cli;
 mod gltf;
 mod gltf_pictures;
 mod invariants;
+mod overwriting;
 mod references;
 mod scenes;
 mod sequence;

@@ -1,10 +1,8 @@
 // Twin of src/camera/sampler.rs: integer arithmetic up to the last conversion, equal bit for bit.
 
+import package::packed::records::{SAMPLER_CMJ, SAMPLER_JITTERED};
 import package::math::{hash_combine, hash_u32, uniform_from_bits};
 
-const SAMPLER_JITTERED: u32 = 0u;
-const SAMPLER_CMJ: u32 = 1u;
-const MAX_TOTAL: u32 = 1073741824u;
 
 struct SampleKey {
     pixel: u32,

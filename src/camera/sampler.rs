@@ -11,14 +11,13 @@
 //! Everything up to the last conversion is integer arithmetic: the WGSL twin `shaders/camera/sampler.wgsl` agrees bit for bit.
 
 use crate::math::{hash_combine, hash_u32, uniform_from_bits};
+use crate::packed::{SAMPLER_CMJ, SAMPLER_JITTERED};
+use crate::shared::shared;
 
-/// `Frame::sampler` and [`SampleKey::sampler`].
-pub const SAMPLER_JITTERED: u32 = 0;
-pub const SAMPLER_CMJ: u32 = 1;
-pub const SAMPLER_SOBOL: u32 = 2;
-
-/// Most rays per pixel that a stratified grid is laid out for.
-pub const MAX_TOTAL: u32 = 1 << 30;
+shared! {
+    /// Most rays per pixel that a stratified grid is laid out for.
+    pub const MAX_TOTAL: u32 = 1 << 30;
+}
 
 /// What a sample's values depend on, besides the set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

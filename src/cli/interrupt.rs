@@ -1,4 +1,4 @@
-//! Ctrl-C: the first asks the render to end, the second ends the program at once.
+//! Signals. Ctrl-C: the first asks the render to end, the second ends the program at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,4 +24,13 @@ pub(super) fn watch() -> Result<Interrupted, Failure> {
         }
     })?;
     Ok(flag)
+}
+
+/// From now on a file that outgrows its limit (`ulimit -f`) is a write that fails, and no end of the program without a word.
+pub(super) fn survive_file_limits() {
+    // SAFETY: no code of ours runs in a handler, and nothing else sets this signal.
+    #[cfg(unix)]
+    unsafe {
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+    }
 }

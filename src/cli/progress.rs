@@ -6,6 +6,7 @@ use std::time::Duration;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
 use super::pool;
+use super::terminal::escaped;
 use crate::renderer::{Phase, Progress};
 
 /// What a render does, and the share of it that is done.
@@ -84,7 +85,7 @@ impl Steps {
     /// Something within a step.
     pub(super) fn say(&self, message: &str) {
         if let Some(bar) = &self.0 {
-            bar.set_message(message.to_owned());
+            bar.set_message(escaped(message));
         }
     }
 

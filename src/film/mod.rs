@@ -7,7 +7,7 @@ mod filter;
 mod flip;
 mod pools;
 mod scrambles;
-mod sums;
+pub(crate) mod sums;
 #[cfg(test)]
 mod test_support;
 
