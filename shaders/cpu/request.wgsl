@@ -12,12 +12,6 @@ import package::cpu::state::{
 import package::accel::trace::{Hit, Ray, trace};
 @if(alpha) import package::material::surface::surface_alpha;
 
-const MAX_ALPHA_LAYERS: u32 = 64u;
-const WORLD_REAL: u32 = 0u;
-const WORLD_VIRTUAL: u32 = 1u;
-const QUERY_NONE: u32 = 2u;
-const MIN_POSITIVE: f32 = 1.1754944e-38;
-
 // One query of a request: a world (QUERY_NONE: the request is answered) and how far.
 struct Query {
     world: u32,

@@ -21,17 +21,6 @@ import package::cpu::state::{
 };
 import package::material::surface::Surface;
 
-const ROULETTE_FROM_DEPTH: u32 = 2u;
-const ROULETTE_GAIN: f32 = 4.0;
-const CONE_ROULETTE_GAIN: f32 = 8.0;
-const CONE_ROULETTE_FLOOR: f32 = 0.1;
-const RECURSION_ROULETTE_GAIN: f32 = 1.0;
-const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
-const SHADOW_SHORTEN: f32 = 2e-5;
-const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
-
-const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
-
 // The cones are seen anew for each question: there is arithmetic to spare, but no memory.
 struct Techniques {
     cone_probability: f32,
@@ -255,6 +244,7 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
                 techniques.cone_probability,
                 (*st).ray.depth,
                 select(REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, leaves_to_cones),
+                vec2<u32>(),
             );
             return;
         }

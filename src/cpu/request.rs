@@ -7,14 +7,19 @@ use crate::math::{hash_combine, length3, uniform_from_bits};
 use crate::packed::{
     FRAME_ALPHA, FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, NONE, PackedScene,
 };
+use crate::shared::shared;
 
-/// A ray that meets this many transparent layers ends at the last.
-const MAX_ALPHA_LAYERS: u32 = 64;
+shared! {
+    /// A ray that meets this many transparent layers ends at the last.
+    const MAX_ALPHA_LAYERS: u32 = 64;
 
-pub const WORLD_REAL: u32 = 0;
-pub const WORLD_VIRTUAL: u32 = 1;
-/// The request is answered.
-const QUERY_NONE: u32 = 2;
+    pub const WORLD_REAL: u32 = 0;
+    pub const WORLD_VIRTUAL: u32 = 1;
+    /// The request is answered.
+    const QUERY_NONE: u32 = 2;
+    /// A length below it is none.
+    const MIN_POSITIVE: f32 = f32::MIN_POSITIVE;
+}
 
 /// One query of a request: a world and how far.
 struct Query {
@@ -194,7 +199,7 @@ fn ray_into(ray: &PathRay, world: u32, t_max: f32) -> Ray {
     if is_shadow(ray.request) && t_max < f32::INFINITY {
         let to_end = ray.direction * t_max - shift;
         distance = length3(to_end);
-        direction = to_end / distance.max(f32::MIN_POSITIVE);
+        direction = to_end / distance.max(MIN_POSITIVE);
     }
     Ray {
         origin: ray.origin.position + shift,

@@ -15,26 +15,30 @@ use crate::material::{
 };
 use crate::math::{dot3, exp_, safe_sqrt};
 use crate::packed::{
-    FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX,
-    MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE, PackedScene,
+    ESTIMATOR_PAPER, FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES,
+    FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE,
+    PackedScene,
 };
+use crate::shared::shared;
 
-/// Paths shorter than this are never ended by roulette.
-const ROULETTE_FROM_DEPTH: u32 = 2;
-/// A continuation is followed for certain while its largest channel times this is at least 1.
-const ROULETTE_GAIN: f32 = 4.0;
-/// The cones and the recursion are followed for certain where their expected contribution times this is at least 1, and never with less
-/// than the floor's probability.
-const CONE_ROULETTE_GAIN: f32 = 8.0;
-const CONE_ROULETTE_FLOOR: f32 = 0.1;
-const RECURSION_ROULETTE_GAIN: f32 = 1.0;
-const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
-/// A light's own surface must not block it: shadow rays end this much short of it, relative to the distance and in position errors.
-const SHADOW_SHORTEN: f32 = 2e-5;
-const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
+shared! {
+    /// Paths shorter than this are never ended by roulette.
+    const ROULETTE_FROM_DEPTH: u32 = 2;
+    /// A continuation is followed for certain while its largest channel times this is at least 1.
+    const ROULETTE_GAIN: f32 = 4.0;
+    /// The cones and the recursion are followed for certain where their expected contribution times this is at least 1, and never with less
+    /// than the floor's probability.
+    const CONE_ROULETTE_GAIN: f32 = 8.0;
+    const CONE_ROULETTE_FLOOR: f32 = 0.1;
+    const RECURSION_ROULETTE_GAIN: f32 = 1.0;
+    const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
+    /// A light's own surface must not block it: shadow rays end this much short of it, relative to the distance and in position errors.
+    const SHADOW_SHORTEN: f32 = 2e-5;
+    const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
-/// Surfaces that scatter nothing.
-const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
+    /// Surfaces that scatter nothing.
+    const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
+}
 
 /// What the techniques of a difference vertex share.
 struct Techniques {
@@ -356,6 +360,7 @@ fn plan_continuation(
             } else {
                 REQUEST_CLOSEST_EACH
             },
+            pad: [0; 2],
         };
         return;
     }
