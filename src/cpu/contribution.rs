@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::state::*;
-use crate::camera::sampler::{SampleKey, SampleSet};
+use crate::camera::sampler::{SampleKey, SampleSet, sample_set};
 use crate::packed::PackedScene;
 
 // Sample sets: 0 is pixel and lens, then five a depth from 7 on.
@@ -23,7 +23,7 @@ pub const ESTIMATOR_PAPER: u32 = 1;
 #[inline]
 pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> SampleSet {
     let set = FIRST_DEPTH_SET + st.depth * SETS_PER_DEPTH + purpose;
-    SampleSet::new(sample_key(scene, st), set)
+    sample_set(sample_key(scene, st), set)
 }
 
 pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {
