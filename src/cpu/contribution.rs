@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::state::*;
-use crate::camera::sampler::{SampleKey, SampleSet};
+use crate::camera::sampler::{SampleKey, SampleSet, sample_set};
 use crate::packed::{ESTIMATOR_PAPER, PackedScene};
 use crate::shared::shared;
 
@@ -23,7 +23,7 @@ shared! {
 #[inline]
 pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> SampleSet {
     let set = FIRST_DEPTH_SET + st.ray.depth * SETS_PER_DEPTH + purpose;
-    SampleSet::new(sample_key(scene, st), set)
+    sample_set(sample_key(scene, st), set)
 }
 
 pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {
