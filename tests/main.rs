@@ -3,6 +3,7 @@
 mod backends;
 mod bench;
 mod cli;
+mod faults;
 mod gltf;
 mod gltf_pictures;
 mod interrupted;
