@@ -75,6 +75,8 @@ pub mod renderer;
 #[doc(hidden)]
 pub mod scene;
 #[doc(hidden)]
+pub mod sequence;
+#[doc(hidden)]
 pub mod shared;
 #[doc(hidden)]
 pub mod stages;
@@ -100,8 +102,8 @@ pub use scene::{
     SceneError, Settings, load, load_with,
 };
 #[doc(inline)]
-pub use stages::{Finished, GpuStages, finish};
+pub use sequence::{RenderedSequence, SequenceError, SequenceOptions, render_sequence};
 #[doc(inline)]
-pub use video::{FrameSink, FrameSource, VideoError};
+pub use stages::{Finished, GpuStages, finish};
 #[doc(inline)]
 pub use work::{Phase, Progress, Watcher};

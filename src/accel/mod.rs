@@ -21,7 +21,7 @@ mod kernel;
 mod large_pages;
 mod spheres;
 mod stack;
-mod trace;
+pub(crate) mod trace;
 mod wide;
 
 #[cfg(all(test, feature = "bench"))]
@@ -35,9 +35,10 @@ use glam::Vec3;
 use obvhs::bvh2::Bvh2;
 use thiserror::Error;
 
-use crate::packed::NONE;
+use crate::shared::NONE;
 use compressed::CompressedBvh;
 use kernel::Kernel;
+pub use trace::Hit;
 use wide::WideBvh;
 
 /// Largest absolute coordinate, metres, for which no product in the triangle test overflows.
@@ -62,17 +63,6 @@ pub struct Ray {
     pub t_max: f32,
     /// [`NONE`] excludes all hits at exactly `t_min`.
     pub skip: u32,
-}
-
-/// Where a ray met a triangle: `(1 - u - v) * v0 + u * v1 + v * v2`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    /// Distance; infinite on a miss.
-    pub t: f32,
-    pub u: f32,
-    pub v: f32,
-    /// Global triangle id, [`NONE`] on a miss.
-    pub triangle: u32,
 }
 
 impl Hit {

@@ -7,7 +7,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::camera::frame_camera;
 use super::lights::pack_lights;
 use crate::accel::{AccelError, WorldBvh};
-use crate::light::environment::environment_table;
+use crate::light::environment_table::environment_table;
 use crate::packed::materials::{MaterialKey, MaterialTable};
 use crate::packed::{
     ESTIMATOR_DIRECT, ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER,
