@@ -301,4 +301,7 @@ pub(crate) use shared;
 shared! {
     /// Index that stands for "none" in every u32 reference.
     pub const NONE: u32 = u32::MAX;
+
+    /// Threads of a workgroup.
+    pub const WORKGROUP: u32 = 64;
 }
