@@ -223,7 +223,7 @@ fn a_file_without_twin_and_functions_that_differ_are_noticed() {
     assert!(check(module, wgsl).is_empty());
     let renamed = wgsl.replace("fn schlick(", "fn slick(");
     assert_eq!(check(module, &renamed).len(), 2);
-    let moved = format!("fn schlick() {{}}\n{wgsl}");
+    let moved = format!("fn fresnel_dielectric() {{}}\n{wgsl}");
     assert_eq!(check(module, &moved).len(), 1);
 }
 
