@@ -5,6 +5,15 @@ use super::wide::{Eight, TriangleBlock, WideBvh, WideNode};
 use crate::shared::shared;
 
 shared! {
+    /// Slack of the projected bounds test, relative to the largest projected coordinate: four units of rounding, doubled.
+    pub(super) const PROJECTED_SLACK: f32 = 1.0 / (1 << 21) as f32;
+    /// Slack of the GPU's box test: 16 units of rounding.
+    const BOX_SLACK: f32 = 1.0 / (1 << 20) as f32;
+    /// 2^-80: its inverse times any distance is finite. A flat box is wider than what such a component moves a ray.
+    const LEAST_COMPONENT: f32 = f32::from_bits((127 - 80) << 23);
+    /// Levels of a tree on the GPU: each leaves at most one group of children waiting.
+    const TRACE_STACK: u32 = super::compressed::MAX_LEVELS as u32;
+
     /// Where a ray met a triangle: `(1 - u - v) * v0 + u * v1 + v * v2`.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Hit {
@@ -19,9 +28,6 @@ shared! {
 
 /// Factor by which a box may be farther than a hit: 16 units of rounding (see the module's proof).
 pub(super) const BOX_MARGIN: f32 = 1.0 + 1.0 / (1 << 20) as f32;
-
-/// Slack of the projected bounds test, relative to the largest projected coordinate: four units of rounding, doubled.
-pub(super) const PROJECTED_SLACK: f32 = 1.0 / (1 << 21) as f32;
 
 /// What the portable traversal needs to know of a ray.
 struct RayFrame {

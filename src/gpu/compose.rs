@@ -153,6 +153,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &material::surface::SHARED,
     &material::texture::SHARED,
     &film::sums::SHARED,
+    &super::lanes::SHARED,
     &cpu::contribution::SHARED,
     &cpu::estimator::SHARED,
     &cpu::request::SHARED,
