@@ -28,6 +28,7 @@ pub mod srgb;
 mod tests;
 pub mod trajectory;
 
+// What a scene asks of the camera stages; each declares its own.
 pub use crate::stages::settings::*;
 pub use error::SceneError;
 pub use file::{Given, load, load_with};
