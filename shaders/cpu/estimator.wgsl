@@ -4,7 +4,7 @@ import package::gpu::buffers::{frame, pixels};
 import package::packed::records::{FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PIXEL_BEAM_MAY_MEET_VIRTUAL};
 import package::shared::NONE;
 import package::material::bsdf::bsdf_albedo;
-import package::light::cones::cone_pdf;
+import package::light::cones::{cone_pdf, cones_at};
 import package::cpu::contribution::{accumulate, density_weight, sample_key};
 import package::light::environment::env_radiance;
 import package::camera::lens::camera_ray_from;
@@ -23,8 +23,6 @@ import package::cpu::state::{
 import package::material::surface::{Surface, surface_at};
 import package::accel::trace::Hit;
 import package::cpu::vertex::shade_vertex;
-
-const TURN_SALT: u32 = 0x7f4a7c15u;
 
 fn difference_turn(pixel: u32, index: u32) -> u32 {
     let period = pixels[pixel].difference_period;
@@ -157,6 +155,7 @@ fn record_first_hit(st: ptr<function, PathState>, s: Surface) {
         s.ns,
         -dot3(s.position - frame.camera_position.xyz, frame.camera_back.xyz),
         bsdf_albedo(s, -(*st).ray.direction),
+        0u,
     );
 }
 
@@ -194,7 +193,7 @@ fn resume(st: ptr<function, PathState>) {
             let real = path_reals[lane];
             (*st).path.mode = MODE_REAL;
             follow(st, real.segment);
-            (*st).ray.depth = real.depth;
+            (*st).ray.depth = (*st).path.real_depth;
             plan_vertex(st, real.hit);
             continue;
         }
@@ -254,7 +253,8 @@ fn path_hit(st: ptr<function, PathState>) -> bool {
 fn paper_behind(st: ptr<function, PathState>) {
     if (*st).hits.in_real.triangle != NONE {
         (*st).path.pending |= PENDING_REAL;
-        path_reals[(*st).lane] = RealPath(followed(st), (*st).hits.in_real, (*st).ray.depth);
+        path_reals[(*st).lane] = RealPath(followed(st), (*st).hits.in_real);
+        (*st).path.real_depth = (*st).ray.depth;
     } else {
         (*st).path.mode = MODE_REAL;
         path_escape(st);
@@ -327,7 +327,7 @@ fn difference_bsdf(st: ptr<function, PathState>) {
 fn vertex_cone_density(st: ptr<function, PathState>) -> f32 {
     let probability = path_differences[(*st).lane].cone_probability;
     if probability == 0.0 { return 0.0; }
-    return probability * cone_pdf((*st).ray.origin.position, path_differences[(*st).lane].normal, (*st).ray.direction);
+    return probability * cone_pdf(cones_at((*st).ray.origin.position, path_differences[(*st).lane].normal), (*st).ray.direction);
 }
 
 fn split_difference(st: ptr<function, PathState>) {
@@ -337,7 +337,8 @@ fn split_difference(st: ptr<function, PathState>) {
         (*st).path.pending |= PENDING_REAL;
         var segment = followed(st);
         segment.throughput = -segment.throughput;
-        path_reals[(*st).lane] = RealPath(segment, (*st).hits.in_real, (*st).ray.depth + 1u);
+        path_reals[(*st).lane] = RealPath(segment, (*st).hits.in_real);
+        (*st).path.real_depth = (*st).ray.depth + 1u;
     }
     (*st).path.mode = MODE_MIXED;
     (*st).ray.depth += 1u;

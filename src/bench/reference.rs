@@ -61,7 +61,7 @@ pub struct Reference {
     pub note: ReferenceNote,
 }
 
-/// Reads or makes the reference of a scene, on the backend that its settings name; `tick` hears how far it is. `None` once `cancelled` says so.
+/// Reads or makes the reference of a scene, on the backend that its settings name; `tick` hears how far it is. `None` once the watcher ends it.
 ///
 /// # Errors
 /// It cannot be read, made or kept, or a given one has another size.
@@ -70,7 +70,7 @@ pub fn reference(
     composite: Composite,
     source: &Source,
     goal: ReferenceGoal,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    watcher: &Watcher<'_>,
     tick: &mut dyn FnMut(&str),
 ) -> Result<Option<Reference>, ReferenceError> {
     let mut scene = scene.clone();
@@ -78,7 +78,7 @@ pub fn reference(
     scene.settings.sampler = SamplerKind::Sobol;
     scene.settings.composite = composite;
     match source {
-        Source::Given(path) => given(scene, path, cancelled),
+        Source::Given(path) => given(scene, path, watcher),
         Source::Folder(folder) => {
             let path = folder.join(file_name(&scene));
             // Kept from run to run, and made anew if it is not good enough.
@@ -86,7 +86,7 @@ pub fn reference(
             if let Some(kept) = kept(&scene, &path, goal) {
                 return Ok(Some(kept));
             }
-            let Some((truth, rays_per_pixel, scrambles)) = make(&scene, goal, cancelled, tick)?
+            let Some((truth, rays_per_pixel, scrambles)) = make(&scene, goal, watcher, tick)?
             else {
                 return Ok(None);
             };
@@ -190,7 +190,7 @@ fn truth_of(file: &ChannelFile) -> Option<Truth> {
 fn given(
     mut scene: Scene,
     path: &Path,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    watcher: &Watcher<'_>,
 ) -> Result<Option<Reference>, ReferenceError> {
     let size = (scene.camera.width, scene.camera.height);
     let check = |width, height| {
@@ -221,8 +221,8 @@ fn given(
             scene.settings.rays_per_pixel = MASK_RAYS;
             let mut renderer =
                 Renderer::new(scene.clone(), RendererOptions::default(), &Watcher::none())?;
-            renderer.advance(Budget::Complete, &Watcher::none().cancelled_by(cancelled))?;
-            if cancelled() {
+            renderer.advance(Budget::Complete, watcher)?;
+            if watcher.is_cancelled() {
                 return Ok(None);
             }
             Truth {
@@ -253,7 +253,7 @@ fn given(
 fn make(
     scene: &Scene,
     goal: ReferenceGoal,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    watcher: &Watcher<'_>,
     tick: &mut dyn FnMut(&str),
 ) -> Result<Option<(Truth, u64, u32)>, ReferenceError> {
     let limit = goal.max_rays_per_pixel;
@@ -267,7 +267,7 @@ fn make(
     let is_trial_enough =
         |mean: &MeanPicture| mean.standard_error() <= goal.standard_error || rays >= longest;
     for _ in 0..SCRAMBLES {
-        if !mean.add(&mut renderer, rays, &mut seed, cancelled, tick)? {
+        if !mean.add(&mut renderer, rays, &mut seed, watcher, tick)? {
             return Ok(None);
         }
     }
@@ -278,7 +278,7 @@ fn make(
         rays = (wanted as u32).next_power_of_two().min(longest);
         mean = MeanPicture::new(scene);
         for _ in 0..SCRAMBLES {
-            if !mean.add(&mut renderer, rays, &mut seed, cancelled, tick)? {
+            if !mean.add(&mut renderer, rays, &mut seed, watcher, tick)? {
                 return Ok(None);
             }
         }
@@ -286,7 +286,7 @@ fn make(
     while mean.standard_error() > goal.standard_error
         && u64::from(rays) * u64::from(mean.scrambles + 1) <= u64::from(limit)
     {
-        if !mean.add(&mut renderer, rays, &mut seed, cancelled, tick)? {
+        if !mean.add(&mut renderer, rays, &mut seed, watcher, tick)? {
             return Ok(None);
         }
     }
@@ -328,7 +328,7 @@ impl MeanPicture {
         renderer: &mut Renderer,
         rays: u32,
         seed: &mut u32,
-        cancelled: &(dyn Fn() -> bool + Sync),
+        watcher: &Watcher<'_>,
         tick: &mut dyn FnMut(&str),
     ) -> Result<bool, RenderError> {
         tick(&format!(
@@ -339,8 +339,8 @@ impl MeanPicture {
         ));
         renderer.set_samples(rays, *seed, &Watcher::none())?;
         *seed = seed.wrapping_add(1);
-        renderer.advance(Budget::Complete, &Watcher::none().cancelled_by(cancelled))?;
-        if cancelled() {
+        renderer.advance(Budget::Complete, watcher)?;
+        if watcher.is_cancelled() {
             return Ok(false);
         }
         self.add_picture(&renderer.picture(), &renderer.planes().mask);
@@ -436,7 +436,7 @@ mod tests {
                 Composite::Additive,
                 &source,
                 goal,
-                &|| false,
+                &Watcher::none(),
                 &mut |_| (),
             )
             .unwrap()

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::Failure;
+use super::{Failure, say};
 
 #[derive(Clone)]
 pub(super) struct Interrupted(Arc<AtomicBool>);
@@ -18,11 +18,19 @@ impl Interrupted {
 pub(super) fn watch() -> Result<Interrupted, Failure> {
     let flag = Interrupted(Arc::new(AtomicBool::new(false)));
     let seen = flag.clone();
-    ctrlc::set_handler(move || {
+    let handler = ctrlc::set_handler(move || {
         if seen.0.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-    })?;
+    });
+    match handler {
+        // A thread to wait on cannot be made.
+        Err(ctrlc::Error::System(_)) => {
+            let message = "Ctrl-C will end the program without its picture: the system lets it have no thread to wait for that";
+            say("warning", message);
+        }
+        other => other?,
+    }
     Ok(flag)
 }
 

@@ -13,18 +13,21 @@ use crate::accel::Hit;
 use crate::camera::lens::camera_ray_from;
 use crate::camera::sampler::sample_4d;
 use crate::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
-use crate::light::cones::{Cones, cone_pdf};
+use crate::light::cones::{cone_pdf, cones_at};
 use crate::light::environment::env_radiance;
 use crate::light::lights::env_arriving;
 use crate::material::{Surface, bsdf_albedo, surface_at};
 use crate::math::{hash_combine, hash_u32};
 use crate::packed::{
-    FRAME_ALPHA, FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL,
-    PackedScene,
+    ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, NONE,
+    PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene,
 };
+use crate::shared::shared;
 
-/// Sets the turns' offset apart from the sampler's streams, which hash the same numbers.
-const TURN_SALT: u32 = 0x7f4a_7c15;
+shared! {
+    /// Sets the turns' offset apart from the sampler's streams, which hash the same numbers.
+    const TURN_SALT: u32 = 0x7f4a_7c15;
+}
 
 /// The difference is evaluated in turns: at one sample in every `difference_period`, from a random offset of the pixel's own, so that each
 /// sample has the same chance. The number of the turn, or NONE if this sample has none.
@@ -191,6 +194,7 @@ fn record_first_hit(scene: &PackedScene, st: &mut PathState, s: &Surface) {
         normal: s.ns,
         depth_m: -(s.position - camera).dot(back),
         albedo: bsdf_albedo(s, -st.ray.direction),
+        pad: 0,
     };
 }
 
@@ -238,7 +242,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.path.pending &= !PENDING_REAL;
             st.path.mode = MODE_REAL;
             follow(st, st.real.segment);
-            st.ray.depth = st.real.depth;
+            st.ray.depth = st.path.real_depth;
             plan_vertex(st, st.real.hit);
             continue;
         }
@@ -313,8 +317,8 @@ fn paper_behind(scene: &PackedScene, st: &mut PathState) {
         st.real = RealPath {
             segment: followed(st),
             hit: st.hits.in_real,
-            depth: st.ray.depth,
         };
+        st.path.real_depth = st.ray.depth;
     } else {
         st.path.mode = MODE_REAL;
         path_escape(scene, st);
@@ -407,7 +411,7 @@ fn vertex_cone_density(scene: &PackedScene, st: &PathState) -> f32 {
     }
     probability
         * cone_pdf(
-            &Cones::at(&scene.frame, st.ray.origin.position, st.difference.normal),
+            &cones_at(&scene.frame, st.ray.origin.position, st.difference.normal),
             st.ray.direction,
         )
 }
@@ -423,8 +427,8 @@ fn split_difference(scene: &PackedScene, st: &mut PathState) {
         st.real = RealPath {
             segment,
             hit: st.hits.in_real,
-            depth: st.ray.depth + 1,
         };
+        st.path.real_depth = st.ray.depth + 1;
     }
     st.path.mode = MODE_MIXED;
     st.ray.depth += 1;

@@ -3,12 +3,11 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::contribution::ESTIMATOR_PAPER;
 use super::estimator::{advance, begin_sample, samples_without_turn};
 use super::request::answer;
 use super::state::{PathState, STAGE_DONE};
-use crate::film::{Film, Guide, GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
-use crate::packed::PackedScene;
+use crate::film::{Film, GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
+use crate::packed::{ESTIMATOR_PAPER, PackedScene};
 use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
 
 /// Pixels a task renders before it looks for cancellation.
@@ -137,18 +136,13 @@ fn main_sample(
             is_virtual,
             contribution,
             real,
-            guide: None,
         },
     );
+    let hit = &st.first_hit;
     if let Some(sums) = guide
-        && st.first_hit.depth_m.is_finite()
+        && hit.depth_m.is_finite()
     {
-        let guide = Guide {
-            depth_m: st.first_hit.depth_m,
-            normal: st.first_hit.normal,
-            albedo: st.first_hit.albedo,
-        };
-        guide_add(sums, guide.depth_m, guide.normal, guide.albedo);
+        guide_add(sums, hit.depth_m, hit.normal, hit.albedo);
     }
 }
 

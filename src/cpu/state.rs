@@ -8,193 +8,198 @@ use glam::Vec3;
 
 use crate::accel::Hit;
 use crate::packed::NONE;
+use crate::shared::shared;
 use crate::work::RayCounts;
 
-/// Finished; the results stand in the accumulators.
-pub const STAGE_DONE: u32 = 0;
-/// Waiting for the primary ray's virtual hit.
-pub const STAGE_PRIMARY_VIRTUAL: u32 = 1;
-/// Waiting for the primary ray's real hit.
-pub const STAGE_PRIMARY_REAL: u32 = 2;
-/// Waiting for the next vertex of a mixed, real or shared path.
-pub const STAGE_PATH: u32 = 3;
-/// Waiting for a path vertex's shadow ray.
-pub const STAGE_PATH_SHADOW: u32 = 4;
-/// Paper estimator: waiting for the real ray that continues behind a virtual hit.
-pub const STAGE_PAPER_BEHIND: u32 = 5;
-/// Waiting for a difference vertex's shadow ray.
-pub const STAGE_DIFFERENCE_SHADOW: u32 = 6;
-/// Waiting for both worlds along a direction drawn inside the cones.
-pub const STAGE_DIFFERENCE_CONE: u32 = 7;
-/// Waiting for both worlds along a direction drawn from the BSDF.
-pub const STAGE_DIFFERENCE_BSDF: u32 = 8;
-/// Real pass: waiting for both worlds along the primary ray.
-pub const STAGE_REAL_PASS: u32 = 9;
+shared! {
+    /// Finished; the results stand in the accumulators.
+    pub const STAGE_DONE: u32 = 0;
+    /// Waiting for the primary ray's virtual hit.
+    pub const STAGE_PRIMARY_VIRTUAL: u32 = 1;
+    /// Waiting for the primary ray's real hit.
+    pub const STAGE_PRIMARY_REAL: u32 = 2;
+    /// Waiting for the next vertex of a mixed, real or shared path.
+    pub const STAGE_PATH: u32 = 3;
+    /// Waiting for a path vertex's shadow ray.
+    pub const STAGE_PATH_SHADOW: u32 = 4;
+    /// Paper estimator: waiting for the real ray that continues behind a virtual hit.
+    pub const STAGE_PAPER_BEHIND: u32 = 5;
+    /// Waiting for a difference vertex's shadow ray.
+    pub const STAGE_DIFFERENCE_SHADOW: u32 = 6;
+    /// Waiting for both worlds along a direction drawn inside the cones.
+    pub const STAGE_DIFFERENCE_CONE: u32 = 7;
+    /// Waiting for both worlds along a direction drawn from the BSDF.
+    pub const STAGE_DIFFERENCE_BSDF: u32 = 8;
+    /// Real pass: waiting for both worlds along the primary ray.
+    pub const STAGE_REAL_PASS: u32 = 9;
 
-/// Path through real and virtual geometry.
-pub const MODE_MIXED: u32 = 0;
-/// Path through real geometry alone.
-pub const MODE_REAL: u32 = 1;
-/// Paper estimator: the part of a path that both worlds share.
-pub const MODE_SHARED: u32 = 2;
-/// Chain of real vertices at which the difference is estimated.
-pub const MODE_DIFFERENCE: u32 = 3;
+    /// Path through real and virtual geometry.
+    pub const MODE_MIXED: u32 = 0;
+    /// Path through real geometry alone.
+    pub const MODE_REAL: u32 = 1;
+    /// Paper estimator: the part of a path that both worlds share.
+    pub const MODE_SHARED: u32 = 2;
+    /// Chain of real vertices at which the difference is estimated.
+    pub const MODE_DIFFERENCE: u32 = 3;
 
-/// Closest virtual hit.
-pub const REQUEST_CLOSEST_VIRTUAL: u32 = 1;
-/// Closest real hit.
-pub const REQUEST_CLOSEST_REAL: u32 = 2;
-/// Closest of both: the real hit is kept only where it is nearer.
-pub const REQUEST_CLOSEST_MIXED: u32 = 3;
-/// Closest in either world, each on its own.
-pub const REQUEST_CLOSEST_EACH: u32 = 4;
-/// Closest virtual hit, and only if there is one the closest real hit on its own.
-pub const REQUEST_VIRTUAL_THEN_REAL: u32 = 5;
-/// Closest real hit, and only if there is one whether something virtual is in front.
-pub const REQUEST_REAL_UNLESS_COVERED: u32 = 6;
-/// Shadow ray in the mixed world.
-pub const REQUEST_SHADOW_MIXED: u32 = 7;
-/// Shadow ray in the real world.
-pub const REQUEST_SHADOW_REAL: u32 = 8;
-/// Shadow ray of the difference: virtual first, real only if something virtual blocks.
-pub const REQUEST_SHADOW_DIFFERENCE: u32 = 9;
-/// The paper's two shadow rays: real, and mixed.
-pub const REQUEST_SHADOW_PAIR: u32 = 10;
+    /// Closest virtual hit.
+    pub const REQUEST_CLOSEST_VIRTUAL: u32 = 1;
+    /// Closest real hit.
+    pub const REQUEST_CLOSEST_REAL: u32 = 2;
+    /// Closest of both: the real hit is kept only where it is nearer.
+    pub const REQUEST_CLOSEST_MIXED: u32 = 3;
+    /// Closest in either world, each on its own.
+    pub const REQUEST_CLOSEST_EACH: u32 = 4;
+    /// Closest virtual hit, and only if there is one the closest real hit on its own.
+    pub const REQUEST_VIRTUAL_THEN_REAL: u32 = 5;
+    /// Closest real hit, and only if there is one whether something virtual is in front.
+    pub const REQUEST_REAL_UNLESS_COVERED: u32 = 6;
+    /// Shadow ray in the mixed world.
+    pub const REQUEST_SHADOW_MIXED: u32 = 7;
+    /// Shadow ray in the real world.
+    pub const REQUEST_SHADOW_REAL: u32 = 8;
+    /// Shadow ray of the difference: virtual first, real only if something virtual blocks.
+    pub const REQUEST_SHADOW_DIFFERENCE: u32 = 9;
+    /// The paper's two shadow rays: real, and mixed.
+    pub const REQUEST_SHADOW_PAIR: u32 = 10;
 
-/// The ray asked for is a shadow ray.
-pub const PENDING_SHADOW: u32 = 1;
-/// [`PathState::next`].
-pub const PENDING_NEXT: u32 = 2;
-/// [`PathState::real`].
-pub const PENDING_REAL: u32 = 4;
-/// [`PathState::difference`].
-pub const PENDING_DIFFERENCE: u32 = 8;
-/// A vertex to be shaded: `vertex_hit`, reached along the ray. Never left pending while a ray is traced.
-pub const PENDING_VERTEX: u32 = 16;
+    /// The ray asked for is a shadow ray.
+    pub const PENDING_SHADOW: u32 = 1;
+    /// [`PathState::next`].
+    pub const PENDING_NEXT: u32 = 2;
+    /// [`PathState::real`].
+    pub const PENDING_REAL: u32 = 4;
+    /// [`PathState::difference`].
+    pub const PENDING_DIFFERENCE: u32 = 8;
+    /// A vertex to be shaded: `vertex_hit`, reached along the ray. Never left pending while a ray is traced.
+    pub const PENDING_VERTEX: u32 = 16;
 
-/// Density that stands for a delta distribution: no other technique can find its directions.
-pub const DELTA_DENSITY: f32 = -1.0;
+    /// Density that stands for a delta distribution: no other technique can find its directions.
+    pub const DELTA_DENSITY: f32 = -1.0;
 
-/// A virtual hit counts as nearer within this relative distance, so that a base lying in the table's plane covers the table.
-pub const COINCIDENCE: f32 = 1e-5;
+    /// A virtual hit counts as nearer within this relative distance, so that a base lying in the table's plane covers the table.
+    pub const COINCIDENCE: f32 = 1e-5;
 
-/// No surface: a ray from the camera.
-pub const SIDE_NONE: u32 = 2;
+    /// No surface: a ray from the camera.
+    pub const SIDE_NONE: u32 = 2;
 
-/// Where a ray starts: a vertex, or the camera.
-#[derive(Clone, Copy, Debug)]
-pub struct RayOrigin {
-    pub position: Vec3,
-    /// The real world is not met closer than this.
-    pub real_t_min: f32,
-    /// The vertex's geometric normal times the position's error bound; zero at the camera.
-    pub offset: Vec3,
-    /// Times `offset`: how far from the vertex its surface may coincide with one of the other world; negative where a path has come to a
-    /// virtual surface from a real one that coincides with it, which then lies behind.
-    pub coincidence_ratio: f32,
-}
+    /// Where a ray starts: a vertex, or the camera.
+    #[derive(Clone, Copy, Debug)]
+    pub struct RayOrigin {
+        pub position: Vec3,
+        /// The real world is not met closer than this.
+        pub real_t_min: f32,
+        /// The vertex's geometric normal times the position's error bound; zero at the camera.
+        pub offset: Vec3,
+        /// Times `offset`: how far from the vertex its surface may coincide with one of the other world; negative where a path has come to a
+        /// virtual surface from a real one that coincides with it, which then lies behind.
+        pub coincidence_ratio: f32,
+    }
 
-/// The ray asked for: all that tracing reads.
-#[derive(Clone, Copy, Debug)]
-pub struct PathRay {
-    pub origin: RayOrigin,
-    /// Unit.
-    pub direction: Vec3,
-    pub t_max: f32,
-    /// `REQUEST_*`.
-    pub request: u32,
-    /// World of the vertex that it leaves: 0 real, 1 virtual, [`SIDE_NONE`].
-    pub side: u32,
-    /// Surface interactions up to and including the vertex that it leaves.
-    pub depth: u32,
-    /// Decides, with surface and depth, whether a surface of partial opacity is met; 0 where no material has any.
-    pub opacity_seed: u32,
-}
+    /// The ray asked for: all that tracing reads.
+    #[derive(Clone, Copy, Debug)]
+    pub struct PathRay {
+        pub origin: RayOrigin,
+        /// Unit.
+        pub direction: Vec3,
+        pub t_max: f32,
+        /// `REQUEST_*`.
+        pub request: u32,
+        /// World of the vertex that it leaves: 0 real, 1 virtual, [`SIDE_NONE`].
+        pub side: u32,
+        /// Surface interactions up to and including the vertex that it leaves.
+        pub depth: u32,
+        /// Decides, with surface and depth, whether a surface of partial opacity is met; 0 where no material has any.
+        pub opacity_seed: u32,
+    }
 
-/// The answer to a request: nearest hits, or for shadow rays whether there is one.
-#[derive(Clone, Copy, Debug)]
-pub struct Hits {
-    pub in_real: Hit,
-    pub in_virtual: Hit,
-}
+    /// The answer to a request: nearest hits, or for shadow rays whether there is one.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Hits {
+        pub in_real: Hit,
+        pub in_virtual: Hit,
+    }
 
-/// The path being followed, and what is left to do after it.
-#[derive(Clone, Copy, Debug)]
-pub struct Path {
-    pub throughput: Vec3,
-    /// Sum of the densities of the techniques that could have drawn the present direction; [`DELTA_DENSITY`]: one technique only.
-    pub density: f32,
-    /// What the vertex's shadow ray adds if it is answered so.
-    pub shadow_contribution: Vec3,
-    /// Samples that this one stands for.
-    pub weight: f32,
-    /// Row-major index.
-    pub pixel: u32,
-    /// Number of the sample among the pixel's that are drawn from one sequence.
-    pub index: u32,
-    /// `STAGE_*`.
-    pub stage: u32,
-    /// `MODE_*`.
-    pub mode: u32,
-    /// `PENDING_*` bits: what is left to do once the present ray is answered.
-    pub pending: u32,
-    /// Material whose volume the path is inside, or NONE.
-    pub medium: u32,
-    /// 1 once the path has scattered other than by a mirror or a smooth interface: what it finds is clamped.
-    pub indirect: u32,
-}
+    /// The path being followed, and what is left to do after it.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Path {
+        pub throughput: Vec3,
+        /// Sum of the densities of the techniques that could have drawn the present direction; [`DELTA_DENSITY`]: one technique only.
+        pub density: f32,
+        /// What the vertex's shadow ray adds if it is answered so.
+        pub shadow_contribution: Vec3,
+        /// Samples that this one stands for.
+        pub weight: f32,
+        /// Row-major index.
+        pub pixel: u32,
+        /// Number of the sample among the pixel's that are drawn from one sequence.
+        pub index: u32,
+        /// `STAGE_*`.
+        pub stage: u32,
+        /// `MODE_*`.
+        pub mode: u32,
+        /// `PENDING_*` bits: what is left to do once the present ray is answered.
+        pub pending: u32,
+        /// Material whose volume the path is inside, or NONE.
+        pub medium: u32,
+        /// 1 once the path has scattered other than by a mirror or a smooth interface: what it finds is clamped.
+        pub indirect: u32,
+        /// Surface interactions up to and including the first vertex of the real path that waits.
+        pub real_depth: u32,
+    }
 
-/// How a path goes on from a vertex.
-#[derive(Clone, Copy, Debug)]
-pub struct Segment {
-    /// Unit.
-    pub direction: Vec3,
-    /// As [`Path::density`].
-    pub density: f32,
-    pub throughput: Vec3,
-    /// As [`Path::medium`].
-    pub medium: u32,
-}
+    /// How a path goes on from a vertex.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Segment {
+        /// Unit.
+        pub direction: Vec3,
+        /// As [`Path::density`].
+        pub density: f32,
+        pub throughput: Vec3,
+        /// As [`Path::medium`].
+        pub medium: u32,
+    }
 
-/// The real path behind a virtual hit: its first vertex, and how it came there.
-#[derive(Clone, Copy, Debug)]
-pub struct RealPath {
-    pub segment: Segment,
-    pub hit: Hit,
-    /// Surface interactions up to and including `hit`.
-    pub depth: u32,
-}
+    /// The real path behind a virtual hit: its first vertex, and how it came there.
+    #[derive(Clone, Copy, Debug)]
+    pub struct RealPath {
+        pub segment: Segment,
+        pub hit: Hit,
+    }
 
-/// The next ray of the chain of vertices at which the difference is estimated. The vertex that it leaves is real.
-#[derive(Clone, Copy, Debug)]
-pub struct DifferenceRay {
-    pub origin: RayOrigin,
-    pub segment: Segment,
-    /// Shading normal, and roulette probability of the cones there, to weigh a BSDF direction against them.
-    pub normal: Vec3,
-    pub cone_probability: f32,
-    pub depth: u32,
-    /// [`REQUEST_REAL_UNLESS_COVERED`] where what the cones cover is left to them, else [`REQUEST_CLOSEST_EACH`].
-    pub request: u32,
-}
+    /// The next ray of the chain of vertices at which the difference is estimated. The vertex that it leaves is real.
+    #[derive(Clone, Copy, Debug)]
+    pub struct DifferenceRay {
+        pub origin: RayOrigin,
+        pub segment: Segment,
+        /// Shading normal, and roulette probability of the cones there, to weigh a BSDF direction against them.
+        pub normal: Vec3,
+        pub cone_probability: f32,
+        pub depth: u32,
+        /// [`REQUEST_REAL_UNLESS_COVERED`] where what the cones cover is left to them, else [`REQUEST_CLOSEST_EACH`].
+        pub request: u32,
+        pub pad: [u32; 2],
+    }
 
-/// What the sample has found.
-#[derive(Clone, Copy, Debug)]
-pub struct PathResult {
-    /// Direct: radiance of the virtual hit, or the difference. Paper: mixed radiance. Real pass: real radiance.
-    pub radiance: Vec3,
-    /// 1 where the primary ray met virtual geometry first.
-    pub mask: u32,
-}
+    /// What the sample has found.
+    #[derive(Clone, Copy, Debug)]
+    pub struct PathResult {
+        /// Direct: radiance of the virtual hit, or the difference. Paper: mixed radiance. Real pass: real radiance.
+        pub radiance: Vec3,
+        /// 1 where the primary ray met virtual geometry first.
+        pub mask: u32,
+    }
 
-/// The first surface met.
-#[derive(Clone, Copy, Debug)]
-pub struct FirstHit {
-    /// Shading normal.
-    pub normal: Vec3,
-    /// Along the view axis in metres; infinite without a hit.
-    pub depth_m: f32,
-    pub albedo: Vec3,
+    /// The first surface met.
+    #[derive(Clone, Copy, Debug)]
+    pub struct FirstHit {
+        /// Shading normal.
+        pub normal: Vec3,
+        /// Along the view axis in metres; infinite without a hit.
+        pub depth_m: f32,
+        pub albedo: Vec3,
+        pub pad: u32,
+    }
 }
 
 /// One sample in flight.
@@ -260,12 +265,12 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
             pending: 0,
             medium: NONE,
             indirect: 0,
+            real_depth: 0,
         },
         next: NO_SEGMENT,
         real: RealPath {
             segment: NO_SEGMENT,
             hit: MISS,
-            depth: 0,
         },
         difference: DifferenceRay {
             origin: NO_ORIGIN,
@@ -274,6 +279,7 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
             cone_probability: 0.0,
             depth: 0,
             request: 0,
+            pad: [0; 2],
         },
         result: PathResult {
             radiance: Vec3::ZERO,
@@ -284,6 +290,7 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
             normal: Vec3::ZERO,
             depth_m: f32::INFINITY,
             albedo: Vec3::ZERO,
+            pad: 0,
         },
         vertex_hit: MISS,
         rays: RayCounts::default(),

@@ -5,9 +5,9 @@ use glam::Vec3;
 use super::contribution::*;
 use super::state::*;
 use crate::camera::sampler::SampleSet;
+use crate::light::blocking::light_may_be_blocked;
 use crate::light::cones::{
-    Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
-    light_may_be_blocked,
+    Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres,
 };
 use crate::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 use crate::material::{
@@ -15,26 +15,30 @@ use crate::material::{
 };
 use crate::math::{dot3, exp_, safe_sqrt};
 use crate::packed::{
-    FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX,
-    MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE, PackedScene,
+    ESTIMATOR_PAPER, FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES,
+    FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE,
+    PackedScene,
 };
+use crate::shared::shared;
 
-/// Paths shorter than this are never ended by roulette.
-const ROULETTE_FROM_DEPTH: u32 = 2;
-/// A continuation is followed for certain while its largest channel times this is at least 1.
-const ROULETTE_GAIN: f32 = 4.0;
-/// The cones and the recursion are followed for certain where their expected contribution times this is at least 1, and never with less
-/// than the floor's probability.
-const CONE_ROULETTE_GAIN: f32 = 8.0;
-const CONE_ROULETTE_FLOOR: f32 = 0.1;
-const RECURSION_ROULETTE_GAIN: f32 = 1.0;
-const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
-/// A light's own surface must not block it: shadow rays end this much short of it, relative to the distance and in position errors.
-const SHADOW_SHORTEN: f32 = 2e-5;
-const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
+shared! {
+    /// Paths shorter than this are never ended by roulette.
+    const ROULETTE_FROM_DEPTH: u32 = 2;
+    /// A continuation is followed for certain while its largest channel times this is at least 1.
+    const ROULETTE_GAIN: f32 = 4.0;
+    /// The cones and the recursion are followed for certain where their expected contribution times this is at least 1, and never with less
+    /// than the floor's probability.
+    const CONE_ROULETTE_GAIN: f32 = 8.0;
+    const CONE_ROULETTE_FLOOR: f32 = 0.1;
+    const RECURSION_ROULETTE_GAIN: f32 = 1.0;
+    const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
+    /// A light's own surface must not block it: shadow rays end this much short of it, relative to the distance and in position errors.
+    const SHADOW_SHORTEN: f32 = 2e-5;
+    const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
-/// Surfaces that scatter nothing.
-const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
+    /// Surfaces that scatter nothing.
+    const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
+}
 
 /// What the techniques of a difference vertex share.
 struct Techniques {
@@ -114,12 +118,12 @@ fn left_to_cones(scene: &PackedScene, s: &Surface) -> bool {
 fn techniques_at(scene: &PackedScene, st: &PathState, s: &Surface, wo: Vec3) -> Techniques {
     if scene.frame.flags & FRAME_NO_CONES != 0 {
         return Techniques {
-            cones: Cones::none(s.ns),
+            cones: Cones::default(),
             cone_probability: 0.0,
             bsdf_probability: 1.0,
         };
     }
-    let cones = Cones::at(&scene.frame, s.position, s.ns);
+    let cones = cones_at(&scene.frame, s.position, s.ns);
     let strength = (st.path.throughput * bsdf_albedo(s, wo))
         .abs()
         .max_element();
@@ -356,6 +360,7 @@ fn plan_continuation(
             } else {
                 REQUEST_CLOSEST_EACH
             },
+            pad: [0; 2],
         };
         return;
     }

@@ -126,18 +126,6 @@ pub struct Sample {
     pub contribution: Vec3,
     /// The real radiance ir of the same sample, if it was traced.
     pub real: Option<Vec3>,
-    /// What the primary mixed ray met, if it met anything.
-    pub guide: Option<Guide>,
-}
-
-/// The first surface of a primary mixed ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Guide {
-    /// Metres along the view axis.
-    pub depth_m: f32,
-    /// Unit, world space.
-    pub normal: Vec3,
-    pub albedo: Vec3,
 }
 
 impl PixelSums {
@@ -286,7 +274,6 @@ mod tests {
                     is_virtual: false,
                     contribution: Vec3::new(0.5, x, 0.5),
                     real: Some(Vec3::ONE),
-                    guide: None,
                 },
             );
         };
@@ -310,7 +297,6 @@ mod tests {
             is_virtual: true,
             contribution: Vec3::ONE,
             real,
-            guide: None,
         };
         let mut sums = PixelSums::default();
         sums.add(0, &sample(Some(Vec3::ONE)));

@@ -9,7 +9,7 @@ use wesl::{CompileOptions, Feature, Mangler, ModulePath, VirtualResolver, Wesl};
 use super::GpuError;
 use crate::packed::{self, PackedScene};
 use crate::shared::{self, Module};
-use crate::{camera, film, light, material, math};
+use crate::{accel, camera, cpu, film, light, material, math};
 
 /// The embedded modules, one a file of `shaders/`: name and source.
 pub const MODULES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/shader_modules.rs"));
@@ -141,6 +141,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &shared::SHARED,
     &math::SHARED,
     &packed::records::SHARED,
+    &accel::trace::SHARED,
     &camera::lens::SHARED,
     &camera::sampler::SHARED,
     &camera::shutter::SHARED,
@@ -152,6 +153,11 @@ pub(super) const DECLARED: &[&Module] = &[
     &material::surface::SHARED,
     &material::texture::SHARED,
     &film::sums::SHARED,
+    &cpu::contribution::SHARED,
+    &cpu::estimator::SHARED,
+    &cpu::request::SHARED,
+    &cpu::state::SHARED,
+    &cpu::vertex::SHARED,
 ];
 
 /// A set of modules to compose from: the embedded ones, some of them replaced or joined by others.

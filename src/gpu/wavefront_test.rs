@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::harness::test_device;
 use super::*;
-use crate::film::{Film, Guide, Sample};
+use crate::film::{Film, Sample, guide_add};
 use crate::packed::Frame;
 use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
 
@@ -62,8 +62,8 @@ fn mix(mut x: u32) -> u32 {
     x ^ (x >> 15)
 }
 
-/// Twin of the toy: the sample, and its rays.
-fn toy_sample(seed: u32, pixel: u32, index: u32, real_pass: bool) -> (Sample, u64) {
+/// Twin of the toy: the sample, its rays, and the normal where there are any.
+fn toy_sample(seed: u32, pixel: u32, index: u32, real_pass: bool) -> (Sample, u64, Vec3) {
     let stage = if real_pass { 2 } else { 1 };
     let mut word = mix(pixel
         .wrapping_mul(65537)
@@ -90,13 +90,8 @@ fn toy_sample(seed: u32, pixel: u32, index: u32, real_pass: bool) -> (Sample, u6
         is_virtual: mask != 0,
         contribution: radiance,
         real: None,
-        guide: (rays > 0).then_some(Guide {
-            depth_m: 1.0,
-            normal,
-            albedo: Vec3::ZERO,
-        }),
     };
-    (sample, rays)
+    (sample, rays, normal)
 }
 
 /// Twin of [`GpuBackend::render`]; returns the mixed rays.
@@ -105,12 +100,17 @@ fn toy_render(seed: u32, film: &mut Film, work: &WorkList) -> u64 {
     let real_pass = work.pass == Pass::Real;
     for w in &work.pixels {
         for index in w.first..w.end {
-            let (sample, rays) = toy_sample(seed, w.pixel, index, real_pass);
+            let (sample, rays, normal) = toy_sample(seed, w.pixel, index, real_pass);
             let pixel = w.pixel as usize;
             if real_pass {
                 film.add_real(pixel, sample.is_virtual, sample.contribution);
             } else {
                 film.add(pixel, &sample);
+                if let Some(guide) = film.guides.get_mut(pixel)
+                    && rays > 0
+                {
+                    guide_add(guide, 1.0, normal, Vec3::ZERO);
+                }
             }
             total += rays;
         }

@@ -9,6 +9,7 @@ use crate::bench::{Law, grow, growth_csv, growth_markdown, growth_plot, growth_t
 use crate::cli::values::choice;
 use crate::cli::{Failure, Outcome, interrupt, print, progress};
 use crate::output::quick::{write_bytes, write_text};
+use crate::renderer::Watcher;
 use crate::scene::Choice;
 
 /// How the cost grows with triangles, pixels, rays, objects and lights: the exponent of each, beside what is expected; minutes
@@ -42,14 +43,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         .collect();
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
+    let watcher = Watcher::none().cancelled_by(&cancelled);
     let count = laws.iter().map(|law| law.steps(&plan)).sum();
     let steps = progress::Steps::new(count);
     let mut curves = Vec::new();
     for &law in &laws {
-        if cancelled() {
+        if watcher.is_cancelled() {
             break;
         }
-        let more = grow(law, &plan, arguments.runs.shrink, &cancelled, &mut |what| {
+        let more = grow(law, &plan, arguments.runs.shrink, &watcher, &mut |what| {
             steps.say(what);
             steps.step();
         })?;
@@ -77,5 +79,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     print(&growth_text(&named, &curves))?;
     let table = growth_markdown(&command_line(), &named, &curves);
-    finish(docs, &table, cancelled())
+    finish(docs, &table, watcher.is_cancelled())
 }

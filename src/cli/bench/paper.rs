@@ -11,6 +11,7 @@ use crate::bench::{
 };
 use crate::cli::{Failure, Outcome, interrupt, print, progress};
 use crate::output::quick::{write_bytes, write_text};
+use crate::renderer::Watcher;
 use crate::scene;
 
 /// The frame rates of Kan and Kaufmann 2012, Table 1, and ours on a scene like theirs
@@ -36,9 +37,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     "paper".clone_into(&mut scene.name);
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
+    let watcher = Watcher::none().cancelled_by(&cancelled);
     let plan = (arguments.runs).plan(paper_rays_per_pixel(), methods, &machine);
     let steps = progress::Steps::new(plan.runs());
-    let (rows, shots) = measure(&scene, &plan, &|_| None, &cancelled, &mut |what| {
+    let (rows, shots) = measure(&scene, &plan, &|_| None, &watcher, &mut |what| {
         steps.say(what);
         steps.step();
     })?;
@@ -50,5 +52,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     print(&paper_text(&named, &rows))?;
     let table = paper_markdown(&command_line(), &named, &rows);
-    finish(docs, &table, cancelled())
+    finish(docs, &table, watcher.is_cancelled())
 }
