@@ -21,7 +21,8 @@ pub const CAMERA: &str = "[camera]\nwidth = 96\nheight = 24\nfx = 100\n";
 pub fn render(text: &str, backend: BackendChoice) -> Renderer {
     let mut scene = scene(text);
     scene.settings.backend = backend;
-    let mut renderer = Renderer::new(scene, RendererOptions::default(), &Watcher::none()).expect("the scene fits");
+    let mut renderer =
+        Renderer::new(scene, RendererOptions::default(), &Watcher::none()).expect("the scene fits");
     complete(&mut renderer);
     renderer
 }

@@ -12,14 +12,14 @@ use super::report::{Frames, Seconds, Stats};
 use crate::cli::progress::Steps;
 use crate::cli::render::say_idle;
 use crate::cli::{Failure, Outcome, interrupt, print, say};
-use crate::output::{check_writable, write_text};
+use crate::output::{PngBits, check_writable, write_text};
 use crate::packed::next_anchor;
 use crate::renderer::{
     Budget, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
 };
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{
-    BackendChoice, Camera, Exposure, Lens, MotionBlurMethod, Scene, fingerprint_of,
+    BackendChoice, Camera, Content, ContentHash, Exposure, Lens, MotionBlurMethod, Scene,
 };
 use crate::stages::{Finished, GpuStages, finish};
 use crate::video::{FrameSink, FrameSource, Header, SinkPlan, VideoFrame};
@@ -314,35 +314,12 @@ impl Sequence<'_> {
         let size = (frame.photo.width, frame.photo.height);
         // The photograph of the moment is no part of what the frames are made with.
         scene.photo = None;
-        let arguments = self.arguments;
-        let fits = scene.settings.exposure == Exposure::Auto;
-        let scope = match fits || arguments.focus_pull.is_some() {
-            true => format!("{:?} {:?}", arguments.range, self.span),
-            false => String::new(),
-        };
-        let poses = &self.files.trajectory;
-        let trajectory = format!(
-            "{:?} {:?} {:?} {:?}",
-            poses.entries, poses.intrinsics, self.files.intrinsics, self.rate
-        );
-        let may_be_gpu = scene.settings.backend != BackendChoice::Cpu;
-        let without = arguments.flags.without().of_pictures(may_be_gpu);
-        let fingerprint = fingerprint_of([
-            env!("CARGO_PKG_VERSION"),
-            &scene.fingerprint(),
-            &format!(
-                "{:?} {:?} {:?} {without:?}",
-                scene.settings, scene.stages, arguments.flags.png_bits
-            ),
-            &trajectory,
-            &format!("{:?} {scope}", arguments.focus_pull),
-        ]);
         let sink = FrameSink::open(SinkPlan {
             path: self.output,
-            fingerprint,
+            fingerprint: self.fingerprint(&scene),
             header: header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate)),
-            png_bits: arguments.flags.png_bits,
-            overwrite: arguments.overwrite,
+            png_bits: self.arguments.flags.png_bits,
+            overwrite: self.arguments.overwrite,
         })?;
         Ok(Started {
             sink,
@@ -356,6 +333,27 @@ impl Sequence<'_> {
             anchor: None,
             notes: 0,
         })
+    }
+
+    /// Of all that the frames are made with but the photographs.
+    fn fingerprint(&self, scene: &Scene) -> String {
+        let arguments = self.arguments;
+        let poses = &self.files.trajectory;
+        let settings = &scene.settings;
+        let may_be_gpu = settings.backend != BackendChoice::Cpu;
+        let without = arguments.flags.without().of_pictures(may_be_gpu);
+        let png_bits = (arguments.flags.png_bits).map(|bits| bits == PngBits::Sixteen);
+        // What is fitted or pulled over the frames depends on which there are.
+        let fits = settings.exposure == Exposure::Auto;
+        let scope =
+            (fits || arguments.focus_pull.is_some()).then_some((arguments.range, self.span));
+        let mut hash = ContentHash::default();
+        (env!("CARGO_PKG_VERSION"), scene.fingerprint()).add_to(&mut hash);
+        (settings, &scene.stages).add_to(&mut hash);
+        (without.names(), png_bits).add_to(&mut hash);
+        (&poses.entries, (poses.intrinsics, self.files.intrinsics)).add_to(&mut hash);
+        (self.rate, (arguments.focus_pull, scope)).add_to(&mut hash);
+        hash.finish()
     }
 
     fn end(self, outcome: Outcome) -> Result<Outcome, Failure> {
