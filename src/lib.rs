@@ -26,6 +26,7 @@ pub mod cli;
 mod clock;
 pub mod cpu;
 mod decode;
+pub mod files;
 pub mod film;
 pub mod gpu;
 pub mod light;
@@ -36,6 +37,7 @@ pub mod output;
 pub mod packed;
 pub mod renderer;
 pub mod scene;
+pub mod sequence;
 pub mod shared;
 pub mod stages;
 

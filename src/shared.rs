@@ -37,25 +37,38 @@ pub trait SharedValue {
     fn value(self) -> Value;
 }
 
-/// The value of a constant as WGSL has it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The value of a constant as WGSL has it; several numbers are a vector if there are at most four, else an array.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     U32(u32),
     I32(i32),
     F32(f32),
-    Vec3([f32; 3]),
+    U32s(Vec<u32>),
+    F32s(Vec<f32>),
 }
 
 impl Value {
     /// Type and literal; the literal has the very bits.
-    fn wgsl(self) -> (&'static str, String) {
+    fn wgsl(&self) -> (String, String) {
         match self {
-            Self::U32(x) => ("u32", format!("{x}u")),
-            Self::I32(x) => ("i32", format!("{x}i")),
-            Self::F32(x) => ("f32", format!("{x:?}f")),
-            Self::Vec3([x, y, z]) => ("vec3<f32>", format!("vec3<f32>({x:?}f, {y:?}f, {z:?}f)")),
+            Self::U32(x) => ("u32".to_owned(), format!("{x}u")),
+            Self::I32(x) => ("i32".to_owned(), format!("{x}i")),
+            Self::F32(x) => ("f32".to_owned(), format!("{x:?}f")),
+            Self::U32s(parts) => several("u32", parts.iter().map(|x| format!("{x}u"))),
+            Self::F32s(parts) => several("f32", parts.iter().map(|x| format!("{x:?}f"))),
         }
     }
+}
+
+/// Type and value of a vector or array.
+fn several(kind: &str, parts: impl ExactSizeIterator<Item = String>) -> (String, String) {
+    let kind = match parts.len() {
+        count @ 2..=4 => format!("vec{count}<{kind}>"),
+        count => format!("array<{kind}, {count}>"),
+    };
+    let parts: Vec<String> = parts.collect();
+    let value = format!("{kind}({})", parts.join(", "));
+    (kind, value)
 }
 
 /// One constant.
@@ -188,9 +201,15 @@ impl SharedValue for f32 {
     }
 }
 
-impl SharedValue for [f32; 3] {
+impl<const N: usize> SharedValue for [f32; N] {
     fn value(self) -> Value {
-        Value::Vec3(self)
+        Value::F32s(self.to_vec())
+    }
+}
+
+impl<const N: usize> SharedValue for [u32; N] {
+    fn value(self) -> Value {
+        Value::U32s(self.to_vec())
     }
 }
 

@@ -3,10 +3,14 @@
 mod backends;
 mod bench;
 mod cli;
+mod faults;
 mod gltf;
 mod gltf_pictures;
+mod interrupted;
 mod invariants;
+mod overwriting;
 mod references;
+mod sandbox;
 mod scenes;
 mod sequence;
 mod smooth;

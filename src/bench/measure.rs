@@ -68,7 +68,7 @@ pub struct Shot {
 }
 
 /// Renders every method at every number of rays, or once to its goal, all of them once before any of them again, after one untimed run of each method at the
-/// fewest rays. `truth` gives the reference for a method, without which its errors stay 0; `tick` hears what is about to be rendered. Once `cancelled` says so, what is
+/// fewest rays. `truth` gives the reference for a method, without which its errors stay 0; `tick` hears what is about to be rendered. Once the watcher ends it, what is
 /// complete is returned.
 ///
 /// # Errors
@@ -77,7 +77,7 @@ pub fn measure<'a>(
     scene: &Scene,
     plan: &Plan,
     truth: &dyn Fn(&Method) -> Option<&'a Truth>,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    watcher: &Watcher<'_>,
     tick: &mut dyn FnMut(&str),
 ) -> Result<(Vec<Row>, Vec<Shot>), MeasureError> {
     let mut subjects = Vec::new();
@@ -88,7 +88,7 @@ pub fn measure<'a>(
         tick(&format!("{}: {}, warm-up", scene.name, method.label()));
         let mut subject = Subject::new(scene, *method)?;
         let fewest = plan.rays_per_pixel.first().copied().unwrap_or(1);
-        subject.run(Some(fewest), plan.first_seed, cancelled)?;
+        subject.run(Some(fewest), plan.first_seed, watcher)?;
         subject.check_backend()?;
         subjects.push(subject);
     }
@@ -114,8 +114,8 @@ pub fn measure<'a>(
                     subject.method.label()
                 ));
                 let given = subject.method.goal.is_none().then_some(rays_per_pixel);
-                let (mut sample, picture) = subject.run(given, seed, cancelled)?;
-                if cancelled() {
+                let (mut sample, picture) = subject.run(given, seed, watcher)?;
+                if watcher.is_cancelled() {
                     break 'runs;
                 }
                 subject.check_backend()?;
@@ -160,11 +160,11 @@ pub fn rmse_of(
     rays_per_pixel: u32,
     seed: u32,
     truth: &Truth,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    watcher: &Watcher<'_>,
 ) -> Result<f64, MeasureError> {
     check_size(scene, truth)?;
     let mut subject = Subject::new(scene, method)?;
-    let (_, picture) = subject.run(Some(rays_per_pixel), seed, cancelled)?;
+    let (_, picture) = subject.run(Some(rays_per_pixel), seed, watcher)?;
     Ok(Errors::of(&picture, truth).all.rmse)
 }
 
@@ -251,7 +251,7 @@ impl Subject {
         &mut self,
         rays_per_pixel: Option<u32>,
         seed: u32,
-        cancelled: &(dyn Fn() -> bool + Sync),
+        watcher: &Watcher<'_>,
     ) -> Result<(Sample, Picture), RenderError> {
         let before = self.renderer.rays();
         let (wall, cpu) = (Instant::now(), ProcessorTime::now());
@@ -260,12 +260,8 @@ impl Subject {
         let setup_secs = wall.elapsed().as_secs_f64();
         let goal = self.method.goal.filter(|_| rays_per_pixel.is_none());
         match goal {
-            Some(goal) => self
-                .renderer
-                .render_to_error(&goal.into(), &Watcher::none().cancelled_by(cancelled))?,
-            None => self
-                .renderer
-                .advance(Budget::Complete, &Watcher::none().cancelled_by(cancelled))?,
+            Some(goal) => self.renderer.render_to_error(&goal.into(), watcher)?,
+            None => self.renderer.advance(Budget::Complete, watcher)?,
         }
         let picture = self.renderer.picture();
         let (wall_secs, cpu_secs) = (wall.elapsed().as_secs_f64(), cpu.elapsed_secs());

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::{ReferenceNote, Truth};
+use crate::files;
 use crate::film::Picture;
-use crate::output::{ChannelFile, OutputError, Target, write_reference};
+use crate::output::{ChannelFile, Format, OutputError, Target, write_reference};
 use crate::renderer::{Budget, RenderError, Renderer, RendererOptions, Watcher};
 use crate::scene::{Choice, Composite, Estimator, Photo, SamplerKind, Scene};
 
@@ -60,7 +61,7 @@ pub struct Reference {
     pub note: ReferenceNote,
 }
 
-/// Reads or makes the reference of a scene, on the backend that its settings name; `tick` hears how far it is. `None` once `cancelled` says so.
+/// Reads or makes the reference of a scene, on the backend that its settings name; `tick` hears how far it is. `None` once the watcher ends it.
 ///
 /// # Errors
 /// It cannot be read, made or kept, or a given one has another size.
@@ -69,7 +70,7 @@ pub fn reference(
     composite: Composite,
     source: &Source,
     goal: ReferenceGoal,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    watcher: &Watcher<'_>,
     tick: &mut dyn FnMut(&str),
 ) -> Result<Option<Reference>, ReferenceError> {
     let mut scene = scene.clone();
@@ -77,13 +78,15 @@ pub fn reference(
     scene.settings.sampler = SamplerKind::Sobol;
     scene.settings.composite = composite;
     match source {
-        Source::Given(path) => given(scene, path, cancelled),
+        Source::Given(path) => given(scene, path, watcher),
         Source::Folder(folder) => {
             let path = folder.join(file_name(&scene));
+            // Kept from run to run, and made anew if it is not good enough.
+            files::own(&path).map_err(OutputError::from)?;
             if let Some(kept) = kept(&scene, &path, goal) {
                 return Ok(Some(kept));
             }
-            let Some((truth, rays_per_pixel, scrambles)) = make(&scene, goal, cancelled, tick)?
+            let Some((truth, rays_per_pixel, scrambles)) = make(&scene, goal, watcher, tick)?
             else {
                 return Ok(None);
             };
@@ -141,7 +144,7 @@ fn keep(
         (RAYS, note.rays_per_pixel.to_string()),
         (SCRAMBLES_MADE, note.scrambles.to_string()),
     ];
-    let target = Target::picture(path)?;
+    let target = Target::named(path, Format::Exr);
     write_reference(
         &target,
         &truth.picture,
@@ -187,7 +190,7 @@ fn truth_of(file: &ChannelFile) -> Option<Truth> {
 fn given(
     mut scene: Scene,
     path: &Path,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    watcher: &Watcher<'_>,
 ) -> Result<Option<Reference>, ReferenceError> {
     let size = (scene.camera.width, scene.camera.height);
     let check = |width, height| {
@@ -218,8 +221,8 @@ fn given(
             scene.settings.rays_per_pixel = MASK_RAYS;
             let mut renderer =
                 Renderer::new(scene.clone(), RendererOptions::default(), &Watcher::none())?;
-            renderer.advance(Budget::Complete, &Watcher::none().cancelled_by(cancelled))?;
-            if cancelled() {
+            renderer.advance(Budget::Complete, watcher)?;
+            if watcher.is_cancelled() {
                 return Ok(None);
             }
             Truth {
@@ -250,7 +253,7 @@ fn given(
 fn make(
     scene: &Scene,
     goal: ReferenceGoal,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    watcher: &Watcher<'_>,
     tick: &mut dyn FnMut(&str),
 ) -> Result<Option<(Truth, u64, u32)>, ReferenceError> {
     let limit = goal.max_rays_per_pixel;
@@ -264,7 +267,7 @@ fn make(
     let is_trial_enough =
         |mean: &MeanPicture| mean.standard_error() <= goal.standard_error || rays >= longest;
     for _ in 0..SCRAMBLES {
-        if !mean.add(&mut renderer, rays, &mut seed, cancelled, tick)? {
+        if !mean.add(&mut renderer, rays, &mut seed, watcher, tick)? {
             return Ok(None);
         }
     }
@@ -275,7 +278,7 @@ fn make(
         rays = (wanted as u32).next_power_of_two().min(longest);
         mean = MeanPicture::new(scene);
         for _ in 0..SCRAMBLES {
-            if !mean.add(&mut renderer, rays, &mut seed, cancelled, tick)? {
+            if !mean.add(&mut renderer, rays, &mut seed, watcher, tick)? {
                 return Ok(None);
             }
         }
@@ -283,7 +286,7 @@ fn make(
     while mean.standard_error() > goal.standard_error
         && u64::from(rays) * u64::from(mean.scrambles + 1) <= u64::from(limit)
     {
-        if !mean.add(&mut renderer, rays, &mut seed, cancelled, tick)? {
+        if !mean.add(&mut renderer, rays, &mut seed, watcher, tick)? {
             return Ok(None);
         }
     }
@@ -325,7 +328,7 @@ impl MeanPicture {
         renderer: &mut Renderer,
         rays: u32,
         seed: &mut u32,
-        cancelled: &(dyn Fn() -> bool + Sync),
+        watcher: &Watcher<'_>,
         tick: &mut dyn FnMut(&str),
     ) -> Result<bool, RenderError> {
         tick(&format!(
@@ -336,8 +339,8 @@ impl MeanPicture {
         ));
         renderer.set_samples(rays, *seed, &Watcher::none())?;
         *seed = seed.wrapping_add(1);
-        renderer.advance(Budget::Complete, &Watcher::none().cancelled_by(cancelled))?;
-        if cancelled() {
+        renderer.advance(Budget::Complete, watcher)?;
+        if watcher.is_cancelled() {
             return Ok(false);
         }
         self.add_picture(&renderer.picture(), &renderer.planes().mask);
@@ -433,7 +436,7 @@ mod tests {
                 Composite::Additive,
                 &source,
                 goal,
-                &|| false,
+                &Watcher::none(),
                 &mut |_| (),
             )
             .unwrap()

@@ -6,6 +6,7 @@ use std::time::Duration;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
 use super::pool;
+use super::terminal::escaped;
 use crate::renderer::{Phase, Progress};
 
 /// What a render does, and the share of it that is done.
@@ -81,10 +82,25 @@ impl Steps {
         Self(Some(bar))
     }
 
+    /// How many steps there are.
+    pub(super) fn expect(&self, count: u64) {
+        if let Some(bar) = &self.0 {
+            bar.set_length(count);
+        }
+    }
+
+    /// Says something while the bar steps aside.
+    pub(super) fn aside(&self, speak: impl FnOnce()) {
+        match &self.0 {
+            Some(bar) => bar.suspend(speak),
+            None => speak(),
+        }
+    }
+
     /// Something within a step.
     pub(super) fn say(&self, message: &str) {
         if let Some(bar) = &self.0 {
-            bar.set_message(message.to_owned());
+            bar.set_message(escaped(message));
         }
     }
 

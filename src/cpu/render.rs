@@ -3,12 +3,11 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::contribution::ESTIMATOR_PAPER;
 use super::estimator::{advance, begin_sample, samples_without_turn};
 use super::request::answer;
 use super::state::{PathState, STAGE_DONE};
-use crate::film::{Film, Guide, GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
-use crate::packed::PackedScene;
+use crate::film::{Film, GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
+use crate::packed::{ESTIMATOR_PAPER, PackedScene};
 use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
 
 /// Pixels a task renders before it looks for cancellation.
@@ -101,8 +100,8 @@ impl Tile<'_> {
         let sums = &mut self.sums[work.pixel as usize - self.first_pixel];
         for index in work.first..work.end {
             let st = run(scene, begin_sample(scene, work.pixel, index, true), rays);
-            let real = st.radiance * scene.frame.exposure_scale;
-            pixel_add_real(sums, index, st.mask != 0, real);
+            let real = st.result.radiance * scene.frame.exposure_scale;
+            pixel_add_real(sums, index, st.result.mask != 0, real);
         }
     }
 }
@@ -117,19 +116,19 @@ fn main_sample(
 ) {
     let st = run(scene, begin_sample(scene, pixel, index, false), rays);
     let scale = scene.frame.exposure_scale;
-    let is_virtual = st.mask != 0;
+    let is_virtual = st.result.mask != 0;
     let (contribution, real) = if scene.frame.estimator == ESTIMATOR_PAPER {
         let real = st.radiance_real * scale;
         (
             if is_virtual {
-                st.radiance * scale
+                st.result.radiance * scale
             } else {
-                (st.radiance - st.radiance_real) * scale
+                (st.result.radiance - st.radiance_real) * scale
             },
             Some(real),
         )
     } else {
-        (st.radiance * scale, None)
+        (st.result.radiance * scale, None)
     };
     sums.add(
         index,
@@ -137,23 +136,18 @@ fn main_sample(
             is_virtual,
             contribution,
             real,
-            guide: None,
         },
     );
+    let hit = &st.first_hit;
     if let Some(sums) = guide
-        && st.depth_m.is_finite()
+        && hit.depth_m.is_finite()
     {
-        let guide = Guide {
-            depth_m: st.depth_m,
-            normal: st.normal,
-            albedo: st.albedo,
-        };
-        guide_add(sums, guide.depth_m, guide.normal, guide.albedo);
+        guide_add(sums, hit.depth_m, hit.normal, hit.albedo);
     }
 }
 
 fn run(scene: &PackedScene, mut st: PathState, rays: &mut RayCounts) -> PathState {
-    while st.stage != STAGE_DONE {
+    while st.path.stage != STAGE_DONE {
         answer(scene, &mut st);
         advance(scene, &mut st);
     }
@@ -168,5 +162,5 @@ pub fn render_first_hit(scene: &PackedScene, pixel: u32, index: u32) -> (Vec3, V
         begin_sample(scene, pixel, index, true),
         &mut RayCounts::default(),
     );
-    (st.radiance, st.albedo)
+    (st.result.radiance, st.first_hit.albedo)
 }

@@ -153,16 +153,20 @@ impl FilmNote {
 
     /// The note as it stands in a film of that folder.
     fn to_text(&self, folder: &Path) -> String {
-        let way = |scene: &PathBuf| pathdiff::diff_paths(scene, folder.canonicalize().ok()?);
+        let way = |scene: &PathBuf| {
+            let way = pathdiff::diff_paths(scene, folder.canonicalize().ok()?)?;
+            // JSON holds no other.
+            way.to_str().is_some().then_some(way)
+        };
         let note = Self {
             scene: self.scene.as_ref().and_then(way),
             ..self.clone()
         };
-        serde_json::json!(WrittenNote {
+        let written = WrittenNote {
             form: FORM,
-            note: &note
-        })
-        .to_string()
+            note: &note,
+        };
+        serde_json::to_string(&written).unwrap_or_default()
     }
 
     /// The note of a film in that folder.
@@ -413,7 +417,7 @@ fn guide_fields() -> Vec<Field<GuideSums, f32, String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{Guide, Sample, planes};
+    use crate::film::{Sample, guide_add, planes};
     use crate::renderer::Skip;
     use crate::scene::Camera;
     use glam::Vec3;
@@ -428,13 +432,13 @@ mod tests {
                     is_virtual: (pixel + index) % 3 == 0,
                     contribution: Vec3::new(x, if bad { f32::NAN } else { x * 1e-7 }, x * 1e9),
                     real: Some(Vec3::splat(x.abs())),
-                    guide: (index % 4 > 0).then_some(Guide {
-                        depth_m: 1.0 + x.abs(),
-                        normal: Vec3::new(x, 0.3, 0.1),
-                        albedo: Vec3::splat(x.abs()),
-                    }),
                 };
                 film.add(pixel as usize, &sample);
+                if index % 4 > 0 {
+                    let normal = Vec3::new(x, 0.3, 0.1);
+                    let guide = &mut film.guides[pixel as usize];
+                    guide_add(guide, 1.0 + x.abs(), normal, Vec3::splat(x.abs()));
+                }
             }
         }
         film

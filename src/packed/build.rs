@@ -7,19 +7,19 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::lights::pack_lights;
 use super::materials::{MaterialKey, MaterialTable};
 use super::{
-    FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER, FRAME_SHUTTER_ORDERED, Frame,
-    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL,
-    PackedScene, PixelInfo, Triangle, Vertex,
+    ESTIMATOR_DIRECT, ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER,
+    FRAME_SHUTTER_ORDERED, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE,
+    PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, SAMPLER_CMJ, SAMPLER_JITTERED,
+    SAMPLER_SOBOL, Triangle, Vertex,
 };
 use crate::accel::{AccelError, WorldBvh};
 use crate::camera::lens::frame_camera;
 use crate::light::environment::environment_table;
 use crate::scene::{
-    Aperture, EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind,
-    Scene, Side,
+    EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind, Scene, Side,
 };
 
-/// The anchor is kept while the camera stays within this distance of it, as a share of the distance that f32 resolves to 1e-7.
+/// The anchor is kept while the camera stays within this distance of it: f32 resolves 1 m to 1e-7 m.
 const ANCHOR_REACH_M: f64 = 1.0;
 
 #[derive(Debug, thiserror::Error)]
@@ -123,10 +123,6 @@ impl PackedScene {
         self.frame.flags &= !(FRAME_SHUTTER | FRAME_SHUTTER_ORDERED);
         let count = scene.camera.width as usize * scene.camera.height as usize;
         self.pixels = vec![PixelInfo::uniform(PIXEL_BEAM_MAY_MEET_VIRTUAL); count];
-        debug_assert!(matches!(
-            scene.lens.aperture,
-            Aperture::Disc | Aperture::Square | Aperture::Blades(_)
-        ));
     }
 
     /// Seed, sampler, estimator, bounces, exposure.
@@ -138,13 +134,13 @@ impl PackedScene {
         frame.max_bounces = settings.max_bounces;
         frame.clamp_indirect = settings.clamp_indirect.min(f32::MAX);
         frame.sampler = match settings.sampler {
-            SamplerKind::Jittered => 0,
-            SamplerKind::Cmj => 1,
-            SamplerKind::Sobol => 2,
+            SamplerKind::Jittered => SAMPLER_JITTERED,
+            SamplerKind::Cmj => SAMPLER_CMJ,
+            SamplerKind::Sobol => SAMPLER_SOBOL,
         };
         frame.estimator = match settings.estimator {
-            Estimator::Direct => 0,
-            Estimator::Paper => 1,
+            Estimator::Direct => ESTIMATOR_DIRECT,
+            Estimator::Paper => ESTIMATOR_PAPER,
         };
         frame.exposure_scale = match settings.exposure {
             Exposure::Ev(ev) => ev.exp2() as f32,

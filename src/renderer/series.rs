@@ -11,8 +11,8 @@ use crate::math::hash_combine;
 use crate::packed::{PIXEL_EDGE, PIXEL_OUT_OF_REACH, PixelInfo};
 use crate::work::{Meter, Phase, Progress, Watcher};
 
-/// Keeps the scrambles' seeds apart from those that a user gives. By chance the number that `cpu/estimator.rs` salts the turns with as well: the
-/// two hash different things, and a new one would be another picture.
+/// Keeps the scrambles' seeds apart from those that a user gives. The same number salts the turns in `cpu/estimator.rs`, which does no harm: that
+/// hashes a pixel with the scramble's own seed, this a scramble's number with the user's.
 const SEED_SALT: u32 = 0x7f4a_7c15;
 
 /// Scrambles of one plan of samples.

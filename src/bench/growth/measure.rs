@@ -1,6 +1,7 @@
 //! A law measured: all sizes in turns, the least of the runs.
 
 use crate::clock::ProcessorTime;
+use crate::renderer::Watcher;
 use glam::Vec3;
 
 use super::scenes::{Step, ball, steps, triangle_counts};
@@ -22,11 +23,11 @@ pub fn grow(
     law: Law,
     plan: &Plan,
     shrink: u32,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    watcher: &Watcher<'_>,
     tick: &mut dyn FnMut(&str),
 ) -> Result<Vec<Curve>, MeasureError> {
     if law == Law::Build {
-        return Ok(build_curve(plan.repeats, cancelled, tick)?
+        return Ok(build_curve(plan.repeats, watcher, tick)?
             .into_iter()
             .collect());
     }
@@ -35,7 +36,7 @@ pub fn grow(
         let label = method.label();
         let mut runners = Vec::new();
         for step in steps(law, shrink) {
-            if cancelled() {
+            if watcher.is_cancelled() {
                 return Ok(curves);
             }
             tick(&format!("{label}: {} {}, warm-up", step.work, law.unit()));
@@ -45,7 +46,7 @@ pub fn grow(
                 scene,
             } = step;
             let mut subject = Subject::new(&scene, method)?;
-            subject.run(Some(rays_per_pixel), plan.first_seed, cancelled)?;
+            subject.run(Some(rays_per_pixel), plan.first_seed, watcher)?;
             subject.check_backend()?;
             runners.push((work, rays_per_pixel, subject, Vec::new(), 0));
         }
@@ -53,8 +54,8 @@ pub fn grow(
         for _ in 0..plan.repeats {
             for (work, rays_per_pixel, subject, runs, rays) in &mut runners {
                 tick(&format!("{label}: {work} {}", law.unit()));
-                let (sample, _) = subject.run(Some(*rays_per_pixel), plan.first_seed, cancelled)?;
-                if cancelled() {
+                let (sample, _) = subject.run(Some(*rays_per_pixel), plan.first_seed, watcher)?;
+                if watcher.is_cancelled() {
                     return Ok(curves);
                 }
                 subject.check_backend()?;
@@ -89,7 +90,7 @@ fn point(work: u64, runs: Vec<f64>, rays: u64) -> Point {
 /// On one thread: processor seconds of several count what they wait for one another.
 fn build_curve(
     repeats: u32,
-    cancelled: &(dyn Fn() -> bool + Sync),
+    watcher: &Watcher<'_>,
     tick: &mut dyn FnMut(&str),
 ) -> Result<Option<Curve>, MeasureError> {
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
@@ -97,7 +98,7 @@ fn build_curve(
     let mut runs = vec![Vec::new(); meshes.len()];
     for turn in 0..=repeats {
         for (mesh, runs) in meshes.iter().zip(&mut runs) {
-            if cancelled() {
+            if watcher.is_cancelled() {
                 return Ok(None);
             }
             tick(&format!("tree of {} triangles", mesh.len()));
@@ -168,7 +169,10 @@ mod tests {
             hardware_gpu: false,
         };
         let mut heard = 0;
-        let curves = grow(Law::RaysPerPixel, &plan, 8, &|| false, &mut |_| heard += 1).unwrap();
+        let curves = grow(Law::RaysPerPixel, &plan, 8, &Watcher::none(), &mut |_| {
+            heard += 1
+        })
+        .unwrap();
         let [curve] = curves.as_slice() else {
             panic!("one method, one curve");
         };
@@ -179,7 +183,14 @@ mod tests {
         // The paper's estimator takes each ray whatever the others brought.
         let rays = curve.rays_exponent.unwrap().slope;
         assert!((rays - 1.0).abs() < 0.02, "{rays}");
-        let none = grow(Law::Objects, &plan, 8, &|| true, &mut |_| ()).unwrap();
+        let none = grow(
+            Law::Objects,
+            &plan,
+            8,
+            &Watcher::none().cancelled_by(&|| true),
+            &mut |_| (),
+        )
+        .unwrap();
         assert!(none.is_empty(), "what is cancelled has no curve");
     }
 }

@@ -4,7 +4,7 @@ use super::rows::{Arguments, Job};
 use crate::bench::{Aim, Goal, Method, Truth, rmse_of};
 use crate::cli::{Failure, progress, say};
 use crate::packed::instants;
-use crate::renderer::{CameraNoise, Skip};
+use crate::renderer::{CameraNoise, Skip, Watcher};
 use crate::scene::{BackendChoice, Choice, Estimator, NoiseFit, Scene};
 
 /// sigma^2 = A y + B of a camera at a low gain, 8-bit codes, where nobody tells of another.
@@ -103,7 +103,7 @@ impl Job {
         &self,
         scene: &Scene,
         truth_of: &dyn Fn(&Method) -> Option<&'a Truth>,
-        cancelled: &(dyn Fn() -> bool + Sync),
+        watcher: &Watcher<'_>,
         steps: &progress::Steps,
     ) -> Result<Vec<Method>, Failure> {
         if self.goals().iter().all(|(_, wanted)| !wanted) {
@@ -126,7 +126,7 @@ impl Job {
                 Skip::CameraNoise => Some(Aim::CameraNoise(self.noise_of(scene))),
                 _ => match self.arguments.target_error {
                     Some(error) => Some(Aim::TargetError(error)),
-                    None => self.usual_error(scene, truth_of, cancelled, steps)?,
+                    None => self.usual_error(scene, truth_of, watcher, steps)?,
                 },
             };
             let Some(aim) = aim else { continue };
@@ -151,7 +151,7 @@ impl Job {
         &self,
         scene: &Scene,
         truth_of: &dyn Fn(&Method) -> Option<&'a Truth>,
-        cancelled: &(dyn Fn() -> bool + Sync),
+        watcher: &Watcher<'_>,
         steps: &progress::Steps,
     ) -> Result<Option<Aim>, Failure> {
         let Some(method) = self.plain().next() else {
@@ -169,7 +169,7 @@ impl Job {
             rays,
             self.arguments.runs.seed,
             truth,
-            cancelled,
+            watcher,
         )?;
         Ok(one_digit(rmse).map(Aim::TargetError))
     }

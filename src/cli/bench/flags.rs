@@ -6,10 +6,12 @@ use clap::Args;
 
 use super::docs::Docs;
 use crate::bench::{Machine, Method, Plan, shrink};
+use crate::cli::scene_flags::SceneFlags;
 use crate::cli::threads::ThreadsFlag;
 use crate::cli::values::{choice, rays_per_pixel};
 use crate::cli::{Failure, Outcome, say};
-use crate::scene::{self, BackendChoice, Composite, Estimator, SamplerKind, Scene};
+use crate::files;
+use crate::scene::{BackendChoice, Composite, Estimator, SamplerKind, Scene};
 
 /// Where figures go, and on how many threads they are made.
 #[derive(Debug, Args)]
@@ -33,9 +35,13 @@ impl OutputFlags {
         Ok(docs)
     }
 
-    /// Makes the folder for what is written, once it is known that something will be.
-    pub(super) fn make_folder(&self) -> Result<&Path, Failure> {
+    /// Makes the folder for what is written, once it is known that something will be; `names` are files that will be in it.
+    pub(super) fn make_folder(&self, names: &[&str]) -> Result<&Path, Failure> {
         let folder = &self.output;
+        files::output(folder)?;
+        for name in names {
+            files::output(&folder.join(name))?;
+        }
         std::fs::create_dir_all(folder).map_err(|error| {
             Failure(format!(
                 "{}: {error}; expected a folder that can be made; give another with -o",
@@ -190,12 +196,13 @@ impl RaysFlag {
 /// Scenes by different names, to be rendered by `backend`; `by` divides their sizes.
 pub(super) fn load_scenes(
     paths: &[PathBuf],
+    flags: SceneFlags,
     by: u32,
     backend: BackendChoice,
 ) -> Result<Vec<Scene>, Failure> {
     let mut scenes: Vec<Scene> = Vec::new();
     for path in paths {
-        let mut scene = shrink(scene::load(path)?, by);
+        let mut scene = shrink(flags.load(path)?, by);
         scene.settings.backend = backend;
         for warning in &scene.warnings {
             say("warning", warning);

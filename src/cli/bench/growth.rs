@@ -8,7 +8,8 @@ use super::flags::{OutputFlags, RunFlags, finish, machine_of};
 use crate::bench::{Law, grow, growth_csv, growth_markdown, growth_plot, growth_text};
 use crate::cli::values::choice;
 use crate::cli::{Failure, Outcome, interrupt, print, progress};
-use crate::output::{write_bytes, write_text};
+use crate::output::quick::{write_bytes, write_text};
+use crate::renderer::Watcher;
 use crate::scene::Choice;
 
 /// How the cost grows with triangles, pixels, rays, objects and lights: the exponent of each, beside what is expected; minutes
@@ -31,7 +32,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let methods = arguments.runs.methods(&machine);
     let named = machine_of(&machine, &methods);
     let plan = arguments.runs.plan(Vec::new(), methods, &machine);
-    let folder = arguments.output.make_folder()?;
+    let folder = arguments
+        .output
+        .make_folder(&["growth.json", "growth.csv"])?;
     let wanted = |law: &Law| arguments.laws.is_empty() || arguments.laws.contains(law);
     let laws: Vec<Law> = Law::CHOICES
         .iter()
@@ -40,14 +43,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         .collect();
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
+    let watcher = Watcher::none().cancelled_by(&cancelled);
     let count = laws.iter().map(|law| law.steps(&plan)).sum();
     let steps = progress::Steps::new(count);
     let mut curves = Vec::new();
     for &law in &laws {
-        if cancelled() {
+        if watcher.is_cancelled() {
             break;
         }
-        let more = grow(law, &plan, arguments.runs.shrink, &cancelled, &mut |what| {
+        let more = grow(law, &plan, arguments.runs.shrink, &watcher, &mut |what| {
             steps.say(what);
             steps.step();
         })?;
@@ -75,5 +79,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     print(&growth_text(&named, &curves))?;
     let table = growth_markdown(&command_line(), &named, &curves);
-    finish(docs, &table, cancelled())
+    finish(docs, &table, watcher.is_cancelled())
 }

@@ -10,7 +10,8 @@ use crate::bench::{
     picture_png, shrink,
 };
 use crate::cli::{Failure, Outcome, interrupt, print, progress};
-use crate::output::{write_bytes, write_text};
+use crate::output::quick::{write_bytes, write_text};
+use crate::renderer::Watcher;
 use crate::scene;
 
 /// The frame rates of Kan and Kaufmann 2012, Table 1, and ours on a scene like theirs
@@ -29,16 +30,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let machine = arguments.runs.machine();
     let methods = arguments.runs.methods(&machine);
     let named = machine_of(&machine, &methods);
-    let folder = arguments.output.make_folder()?;
+    let folder = arguments.output.make_folder(&["paper.json", "paper.png"])?;
     let path = folder.join("paper.toml");
     write_text(&path, PAPER_SCENE)?;
     let mut scene = shrink(scene::load(&path)?, arguments.runs.shrink);
     "paper".clone_into(&mut scene.name);
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
+    let watcher = Watcher::none().cancelled_by(&cancelled);
     let plan = (arguments.runs).plan(paper_rays_per_pixel(), methods, &machine);
     let steps = progress::Steps::new(plan.runs());
-    let (rows, shots) = measure(&scene, &plan, &|_| None, &cancelled, &mut |what| {
+    let (rows, shots) = measure(&scene, &plan, &|_| None, &watcher, &mut |what| {
         steps.say(what);
         steps.step();
     })?;
@@ -50,5 +52,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     print(&paper_text(&named, &rows))?;
     let table = paper_markdown(&command_line(), &named, &rows);
-    finish(docs, &table, cancelled())
+    finish(docs, &table, watcher.is_cancelled())
 }

@@ -18,9 +18,10 @@ use crate::bench::{
     FORMAT, Machine, Method, Plan, ReferenceGoal, Report, Source, markdown, measure, reference,
     text,
 };
+use crate::cli::scene_flags::SceneFlags;
 use crate::cli::values::{above_zero, camera_noise, choice, rays_per_pixel};
 use crate::cli::{Failure, Outcome, interrupt, print, progress, say};
-use crate::renderer::{CameraNoise, SCRAMBLES, Skip};
+use crate::renderer::{CameraNoise, SCRAMBLES, Skip, Watcher};
 use crate::scene::{BackendChoice, Choice, Estimator};
 
 /// Flags that say what is measured, which nothing is with `--report`.
@@ -49,6 +50,8 @@ pub(super) struct Arguments {
     /// Scene files
     #[arg(value_name = "SCENE")]
     scenes: Vec<PathBuf>,
+    #[command(flatten)]
+    scene: SceneFlags,
     #[command(flatten)]
     pub rays: RaysFlag,
     #[command(flatten)]
@@ -226,10 +229,23 @@ fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
         true => BackendChoice::Gpu,
         false => BackendChoice::Cpu,
     };
-    let scenes = load_scenes(&arguments.scenes, arguments.runs.shrink, backend)?;
-    let folder = arguments.output.make_folder()?;
+    let scenes = load_scenes(
+        &arguments.scenes,
+        arguments.scene,
+        arguments.runs.shrink,
+        backend,
+    )?;
+    let plots = scenes.iter().flat_map(|scene| {
+        ["time.svg", "time.png", "rays.svg", "rays.png"]
+            .map(|axis| format!("{}-error-{axis}", scene.name))
+    });
+    let plots: Vec<String> = plots.collect();
+    let mut names = vec!["results.json", "results.csv", "index.html"];
+    names.extend(plots.iter().map(String::as_str));
+    let folder = arguments.output.make_folder(&names)?;
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
+    let watcher = Watcher::none().cancelled_by(&cancelled);
     let steps = progress::Steps::new(scenes.iter().map(|scene| job.runs_of(scene)).sum());
     let mut report = job.empty_report();
     let mut gallery = Gallery::default();
@@ -244,7 +260,7 @@ fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
     'scenes: for scene in &scenes {
         let mut truths = BTreeMap::new();
         for composite in &arguments.runs.composites {
-            let found = reference(scene, *composite, &source, goal, &cancelled, &mut |what| {
+            let found = reference(scene, *composite, &source, goal, &watcher, &mut |what| {
                 steps.say(what);
             })?;
             let Some(found) = found else {
@@ -255,12 +271,12 @@ fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
         }
         let truth_of = |method: &Method| truths.get(method.composite.name());
         let mut methods = job.methods.clone();
-        methods.extend(job.goal_methods(scene, &truth_of, &cancelled, &steps)?);
-        if cancelled() {
+        methods.extend(job.goal_methods(scene, &truth_of, &watcher, &steps)?);
+        if watcher.is_cancelled() {
             break;
         }
         let plan = job.plan(rays_per_pixel.clone(), methods);
-        let (rows, shots) = measure(scene, &plan, &truth_of, &cancelled, &mut |what| {
+        let (rows, shots) = measure(scene, &plan, &truth_of, &watcher, &mut |what| {
             steps.say(what);
             steps.step();
         })?;
@@ -274,7 +290,7 @@ fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
         }
         conclude(&mut report, arguments.target_rmse);
         write_figures(&report, folder)?;
-        if cancelled() {
+        if watcher.is_cancelled() {
             break;
         }
     }
@@ -284,5 +300,5 @@ fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
     } else {
         write_pictures(&report, &gallery, folder)?;
     }
-    Ok((report, cancelled()))
+    Ok((report, watcher.is_cancelled()))
 }

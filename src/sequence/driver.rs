@@ -1,18 +1,14 @@
 //! The frames one after the other.
 
-use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
 use glam::DVec3;
 
-use super::Arguments;
 use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
-use super::report::{Frames, Seconds, Stats};
-use crate::cli::progress::Steps;
-use crate::cli::render::say_idle;
-use crate::cli::{Failure, Outcome, interrupt, print, say};
-use crate::output::{PngBits, check_writable, write_text};
+use super::report::{FrameCounts, SequenceSeconds, SequenceStats};
+use super::{Event, SequenceError, SequenceOptions};
+use crate::output::PngBits;
 use crate::packed::next_anchor;
 use crate::renderer::{
     Budget, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
@@ -27,111 +23,112 @@ use crate::video::{FrameSink, FrameSource, Header, SinkPlan, VideoFrame};
 /// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
 const REACH_FRAMES: f64 = 1.5;
 
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let files = Files::read(arguments)?;
-    let frames = arguments.frames.as_deref();
-    let output = arguments.output.as_deref().unwrap_or(Path::new("-"));
-    let frames = frames.ok_or_else(|| {
-        Failure(
+/// What became of a sequence.
+#[derive(Debug)]
+pub struct RenderedSequence {
+    pub stats: SequenceStats,
+    /// All frames are there; else it was cancelled, and the same options go on with it.
+    pub complete: bool,
+}
+
+/// Renders the frames one after the other. Those that an earlier call with the same options finished are kept; once `watcher` cancels, it ends
+/// with the frames that are finished. `hear` is told what happens; `watcher` hears of each frame's rays.
+///
+/// # Errors
+/// Something cannot be read, does not fit together, or cannot be written. Frames that are finished stay.
+pub fn render_sequence(
+    options: &SequenceOptions,
+    watcher: &Watcher<'_>,
+    hear: &dyn Fn(&Event<'_>),
+) -> Result<RenderedSequence, SequenceError> {
+    let files = Files::read(options)?;
+    let frames = options.frames.as_deref().ok_or_else(|| {
+        SequenceError::Unfit(
             "--frames is absent; expected a folder of pictures, a .y4m file, or -; add it"
                 .to_owned(),
         )
     })?;
-    refuse_same_place(frames, output)?;
-    if let Some(path) = &arguments.flags.stats {
-        check_writable(path)?;
-    }
     let mut source = FrameSource::open(frames)?;
-    let rate = known_rate(arguments, &files.trajectory, Some(&source));
+    let rate = known_rate(options, &files.trajectory, Some(&source));
     let views = views(&files.trajectory, rate, source.is_stream())?;
-    check_frames(arguments, &source, &views)?;
-    let count = source.names().map(|names| {
+    check_frames(options, &source, &views)?;
+    let names: Option<Vec<FrameName>> = source.names().map(|names| {
         names
-            .iter()
-            .filter(|name| in_range(arguments, name))
-            .count()
+            .into_iter()
+            .filter(|name| in_range(options, name))
+            .collect()
     });
-    if let (Some((from, to)), None) = (arguments.focus_pull, &count)
-        && arguments.range.is_none()
+    if let (Some((from, to)), None) = (options.focus_pull_m, &names)
+        && options.range.is_none()
     {
-        return Err(Failure(format!(
+        return Err(SequenceError::Unfit(format!(
             "--focus-pull {from}..{to} of a stream whose length is not known; expected a range; give --range"
         )));
     }
-    let interrupted = interrupt::watch()?;
-    let bar = Steps::new(count.unwrap_or(0) as u64);
+    hear(&Event::Plan {
+        frames: names.as_ref().map(Vec::len),
+    });
     let mut sequence = Sequence {
-        arguments,
+        options,
         files: &files,
         views: &views,
         rate,
-        span: span(arguments, &source),
-        output,
+        span: span(options, &source),
+        names: names.unwrap_or_default(),
+        hear,
         started: None,
-        frames: Frames::default(),
-        seconds: Seconds::default(),
+        frames: FrameCounts::default(),
+        seconds: SequenceSeconds::default(),
         rays: RayCounts::default(),
         non_finite_samples: 0,
     };
-    let outcome = loop {
-        if interrupted.is_set() {
-            break Outcome::Interrupted;
+    let complete = loop {
+        if watcher.is_cancelled() {
+            break false;
         }
         let begin = Instant::now();
-        let wanted = |name: &FrameName| in_range(arguments, name);
+        let wanted = |name: &FrameName| in_range(options, name);
         let Some((name, frame)) = source.next(&wanted)? else {
-            break Outcome::Done;
+            break true;
         };
         sequence.seconds.load += begin.elapsed().as_secs_f64();
-        if arguments.range.is_some_and(|(_, to)| name.number >= to) {
-            break Outcome::Done;
+        if options.range.is_some_and(|(_, to)| name.number >= to) {
+            break true;
         }
         let Some(frame) = frame else { continue };
-        bar.say(&name.label);
+        let (label, number) = (name.label.as_str(), name.number);
+        hear(&Event::Begins { label, number });
         let header = source.header().cloned();
-        if !sequence.take(&name, frame, header, &|| interrupted.is_set())? {
-            break Outcome::Interrupted;
+        if !sequence.take(&name, frame, header, watcher)? {
+            break false;
         }
-        bar.step();
+        hear(&Event::Ends { label, number });
     };
-    bar.clear();
-    sequence.end(outcome)
+    sequence.end(complete)
 }
 
 /// The first and the last frame's number, where they are known: the focus is pulled between them.
-fn span(arguments: &Arguments, source: &FrameSource) -> Option<(u32, u32)> {
-    if let Some((from, to)) = arguments.range {
+fn span(options: &SequenceOptions, source: &FrameSource) -> Option<(u32, u32)> {
+    if let Some((from, to)) = options.range {
         return Some((from, to - 1));
     }
     let names = source.names()?;
     Some((names.first()?.number, names.last()?.number))
 }
 
-fn refuse_same_place(frames: &Path, output: &Path) -> Result<(), Failure> {
-    let same = match (frames.canonicalize(), output.canonicalize()) {
-        (Ok(frames), Ok(output)) => frames == output,
-        _ => false,
-    };
-    if !same {
-        return Ok(());
-    }
-    Err(Failure(format!(
-        "{}: the frames would be replaced; expected another place for the output; give another -o",
-        output.display()
-    )))
-}
-
 struct Sequence<'a> {
-    arguments: &'a Arguments,
+    options: &'a SequenceOptions,
     files: &'a Files,
     views: &'a Views<'a>,
     /// Frames a second, where known.
     rate: Option<f64>,
     span: Option<(u32, u32)>,
-    output: &'a Path,
+    /// The frames to come, where they are known.
+    names: Vec<FrameName>,
+    hear: &'a dyn Fn(&Event<'_>),
     started: Option<Started>,
-    frames: Frames,
-    seconds: Seconds,
+    frames: FrameCounts,
+    seconds: SequenceSeconds,
     rays: RayCounts,
     non_finite_samples: u64,
 }
@@ -159,11 +156,11 @@ impl Sequence<'_> {
         name: &FrameName,
         frame: VideoFrame,
         header: Option<Header>,
-        interrupted: &(dyn Fn() -> bool + Sync),
-    ) -> Result<bool, Failure> {
+        watcher: &Watcher<'_>,
+    ) -> Result<bool, SequenceError> {
         let view = self.views.of(name)?;
         for warning in &frame.warnings {
-            say("warning", &format!("{}: {warning}", name.label));
+            (self.hear)(&Event::Warning(format!("{}: {warning}", name.label)));
         }
         let size = (frame.photo.width, frame.photo.height);
         let started = match self.started.take() {
@@ -172,7 +169,7 @@ impl Sequence<'_> {
         };
         let started = self.started.insert(started);
         if size != started.size {
-            return Err(Failure(format!(
+            return Err(SequenceError::Unfit(format!(
                 "{}: it has {} x {} pixels where the frames before have {} x {}; expected frames of one size; scale it, then go on with the same command",
                 name.label, size.0, size.1, started.size.0, started.size.1
             )));
@@ -182,7 +179,7 @@ impl Sequence<'_> {
             // The same for every frame whichever run renders it.
             started.anchor = Some(next_anchor(started.anchor, position));
         }
-        let there = started.sink.has(name);
+        let there = started.sink.has(name, &frame)?;
         let Some(world_from_camera) = view.world_from_camera else {
             if there {
                 self.frames.kept += 1;
@@ -196,7 +193,7 @@ impl Sequence<'_> {
         };
         let camera = match self.files.intrinsics_of(&view) {
             Some(intrinsics) => (intrinsics.camera(size, world_from_camera)).map_err(|problem| {
-                Failure(format!("{}: {problem}; expected intrinsics of the frames' size; calibrate at that size, or scale the frames", name.label))
+                SequenceError::Unfit(format!("{}: {problem}; expected intrinsics of the frames' size; calibrate at that size, or scale the frames", name.label))
             })?,
             None => Camera {
                 world_from_camera,
@@ -212,7 +209,7 @@ impl Sequence<'_> {
                 time_secs,
             });
         let lens = Lens {
-            focus_distance_m: pulled_focus(self.arguments.focus_pull, self.span, name.number)
+            focus_distance_m: pulled_focus(self.options.focus_pull_m, self.span, name.number)
                 .or(view.focus_distance_m)
                 .unwrap_or(started.lens.focus_distance_m),
             ..started.lens
@@ -222,12 +219,16 @@ impl Sequence<'_> {
             // Fitted once, to the first posed frame of the range, whether or not that one is finished.
             scene.photo = Some(frame.photo.clone());
             scene.camera = camera.clone();
-            let options = RendererOptions {
-                without: self.arguments.flags.without(),
+            let with = RendererOptions {
+                without: self.options.without,
                 ..RendererOptions::default()
             };
-            let renderer = Renderer::new(scene, options, &Watcher::none())?;
-            say_idle(&renderer, None);
+            let renderer = Renderer::new(scene, with, &watcher.to_the_end())?;
+            let estimator = renderer.scene().settings.estimator;
+            let on_gpu = renderer.gpu_device().is_some();
+            for (saving, reason) in renderer.without().idle(estimator, on_gpu, None) {
+                (self.hear)(&Event::Idle { saving, reason });
+            }
             let seconds = renderer.seconds();
             self.seconds.compile += seconds.compile;
             self.seconds.first_build += begin.elapsed().as_secs_f64() - seconds.compile;
@@ -256,9 +257,9 @@ impl Sequence<'_> {
         )?;
         self.seconds.edit += begin.elapsed().as_secs_f64();
         let begin = Instant::now();
-        renderer.advance(Budget::Complete, &Watcher::none().cancelled_by(interrupted))?;
+        renderer.advance(Budget::Complete, watcher)?;
         self.seconds.render += begin.elapsed().as_secs_f64();
-        if interrupted() {
+        if watcher.is_cancelled() {
             return Ok(false);
         }
         let begin = Instant::now();
@@ -286,12 +287,12 @@ impl Sequence<'_> {
         self.frames.moving += u32::from(renderer.is_moving());
         self.non_finite_samples += renderer.film().non_finite_samples();
         for note in renderer.notes().iter().skip(started.notes) {
-            say("note", note);
+            (self.hear)(&Event::Note(note.to_string()));
         }
         started.notes = renderer.notes().len();
         if self.frames.rendered == 1 {
             for note in &notes {
-                say("note", note);
+                (self.hear)(&Event::Note(note.to_string()));
             }
         }
         let begin = Instant::now();
@@ -306,20 +307,22 @@ impl Sequence<'_> {
         view: &FrameView,
         frame: &VideoFrame,
         header: Option<Header>,
-    ) -> Result<Started, Failure> {
-        let mut scene = self
-            .files
-            .scene(self.arguments, view, Some(frame.photo.clone()))?;
+    ) -> Result<Started, SequenceError> {
+        let mut scene =
+            self.files
+                .scene(self.options, view, Some(frame.photo.clone()), self.hear)?;
         check_rate(&scene, self.rate, self.views.have_own_times())?;
         let size = (frame.photo.width, frame.photo.height);
         // The photograph of the moment is no part of what the frames are made with.
         scene.photo = None;
+        let options = self.options;
         let sink = FrameSink::open(SinkPlan {
-            path: self.output,
+            path: &options.output,
             fingerprint: self.fingerprint(&scene),
             header: header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate)),
-            png_bits: self.arguments.flags.png_bits,
-            overwrite: self.arguments.overwrite,
+            png_bits: options.png_bits,
+            overwrite: options.overwrite,
+            names: self.names.clone(),
         })?;
         Ok(Started {
             sink,
@@ -337,66 +340,45 @@ impl Sequence<'_> {
 
     /// Of all that the frames are made with but the photographs.
     fn fingerprint(&self, scene: &Scene) -> String {
-        let arguments = self.arguments;
+        let options = self.options;
         let poses = &self.files.trajectory;
         let settings = &scene.settings;
         let may_be_gpu = settings.backend != BackendChoice::Cpu;
-        let without = arguments.flags.without().of_pictures(may_be_gpu);
-        let png_bits = (arguments.flags.png_bits).map(|bits| bits == PngBits::Sixteen);
-        // What is fitted or pulled over the frames depends on which there are.
+        let without = options.without.of_pictures(may_be_gpu);
+        let png_bits = (options.png_bits).map(|bits| bits == PngBits::Sixteen);
+        // What is fitted or pulled over the frames depends on which there are; a file tells by their order which it holds.
         let fits = settings.exposure == Exposure::Auto;
-        let scope =
-            (fits || arguments.focus_pull.is_some()).then_some((arguments.range, self.span));
+        let is_file = options.output.extension().is_some_and(|e| e == "y4m");
+        let scope = (fits || options.focus_pull_m.is_some() || is_file)
+            .then_some((options.range, self.span));
         let mut hash = ContentHash::default();
         (env!("CARGO_PKG_VERSION"), scene.fingerprint()).add_to(&mut hash);
         (settings, &scene.stages).add_to(&mut hash);
         (without.names(), png_bits).add_to(&mut hash);
         (&poses.entries, (poses.intrinsics, self.files.intrinsics)).add_to(&mut hash);
-        (self.rate, (arguments.focus_pull, scope)).add_to(&mut hash);
+        (self.rate, (options.focus_pull_m, scope)).add_to(&mut hash);
         hash.finish()
     }
 
-    fn end(self, outcome: Outcome) -> Result<Outcome, Failure> {
+    fn end(self, complete: bool) -> Result<RenderedSequence, SequenceError> {
         let Some(started) = self.started else {
-            return Err(Failure(format!(
+            let frames = self.options.frames.as_deref().unwrap_or(Path::new("-"));
+            return Err(SequenceError::Unfit(format!(
                 "{}: no frame of the range was found; expected at least one; correct --range",
-                self.arguments
-                    .frames
-                    .as_deref()
-                    .unwrap_or(Path::new("-"))
-                    .display()
+                frames.display()
             )));
         };
-        if outcome == Outcome::Done {
+        if complete {
             started.sink.finish()?;
         }
-        let stats = Stats::new(
+        let stats = SequenceStats::new(
             self.frames,
             self.seconds,
             self.rays,
             self.non_finite_samples,
             started.renderer.as_ref(),
         );
-        if let Some(path) = &self.arguments.flags.stats {
-            write_text(path, &serde_json::to_string_pretty(&stats)?)?;
-        }
-        let text = stats.text(&self.output.display().to_string());
-        if self.output == Path::new("-") {
-            // Standard output is the film. Without a stderr there is nobody to tell.
-            let _ = std::io::stderr().write_all(text.as_bytes());
-        } else {
-            print(&text)?;
-        }
-        if stats.non_finite_samples > 0 {
-            say(
-                "warning",
-                &format!(
-                    "{} samples were not finite and are left out",
-                    stats.non_finite_samples
-                ),
-            );
-        }
-        Ok(outcome)
+        Ok(RenderedSequence { stats, complete })
     }
 }
 
