@@ -27,11 +27,15 @@ pub(super) fn aligned(cells: &[Vec<String>]) -> String {
     out
 }
 
-/// RFC 4180.
-pub(super) fn escaped(value: &str) -> String {
-    if value.contains([',', '"', '\n']) {
-        format!("\"{}\"", value.replace('"', "\"\""))
-    } else {
-        value.to_owned()
+/// Comma-separated values, a line a record.
+pub(super) fn csv_text<T: AsRef<[u8]>>(records: impl IntoIterator<Item = Vec<T>>) -> String {
+    let mut writer = csv::WriterBuilder::new()
+        .flexible(true)
+        .from_writer(Vec::new());
+    for record in records {
+        // Into memory: always.
+        let _ = writer.write_record(record);
     }
+    let bytes = writer.into_inner().unwrap_or_default();
+    String::from_utf8_lossy(&bytes).into_owned()
 }

@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use image::ImageResult;
+use pulldown_cmark::html::push_html;
+use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 
 use super::{Axis, Plot, Report, Shot, Truth, difference_png, markdown, picture_png};
 use crate::scene::Composite;
@@ -179,53 +181,18 @@ fn escaped(text: &str) -> String {
         .replace('>', "&gt;")
 }
 
-/// The few forms that [`markdown`] uses: an indented line of code, lists, and tables.
+/// As HTML; what looks like HTML in it is text.
 fn from_markdown(text: &str) -> String {
+    let events = Parser::new_ext(text, Options::ENABLE_TABLES).map(|event| match event {
+        Event::Html(text) | Event::InlineHtml(text) => Event::Text(text),
+        Event::Start(Tag::Table(_)) => {
+            Event::Html("<div class=\"scroll\"><table class=\"figures\">".into())
+        }
+        Event::End(TagEnd::Table) => Event::Html("</tbody></table></div>\n".into()),
+        event => event,
+    });
     let mut out = String::new();
-    let mut open = "";
-    for line in text.lines() {
-        let kind = match line {
-            _ if line.starts_with("    ") => "pre",
-            _ if line.starts_with("- ") => "ul",
-            _ if line.starts_with('|') => "table",
-            _ => "",
-        };
-        if kind != open {
-            out += match open {
-                "pre" => "</pre>\n",
-                "ul" => "</ul>\n",
-                "table" => "</table></div>\n",
-                _ => "",
-            };
-            out += match kind {
-                "pre" => "<pre>",
-                "ul" => "<ul>\n",
-                "table" => "<div class=\"scroll\"><table class=\"figures\">\n",
-                _ => "",
-            };
-        }
-        match kind {
-            "pre" => out += &escaped(line.trim_start()),
-            "ul" => {
-                let _ = writeln!(out, "<li>{}</li>", escaped(&line[2..]));
-            }
-            "table" if !line.contains("---") => {
-                let tag = if open == "table" { "td" } else { "th" };
-                out += "<tr>";
-                for cell in line.trim_matches('|').split('|') {
-                    let _ = write!(out, "<{tag}>{}</{tag}>", escaped(cell.trim()));
-                }
-                out += "</tr>\n";
-            }
-            _ => {}
-        }
-        open = kind;
-    }
-    if open == "ul" {
-        out += "</ul>\n";
-    } else if open == "table" {
-        out += "</table></div>\n";
-    }
+    push_html(&mut out, events);
     out
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::columns::{aligned, escaped};
+use super::columns::{aligned, csv_text};
 use super::{Figures, Reach, Report, Row};
 
 /// One heading and how a row's cell is written.
@@ -195,7 +195,7 @@ fn remarks(report: &Report) -> Vec<String> {
 
 /// One line a row with every figure, under a line of names.
 pub fn csv(report: &Report) -> String {
-    let mut out = String::new();
+    let mut records = Vec::new();
     let machine = &report.machine;
     let gpu = machine.gpu.as_ref();
     for (number, row) in report.rows.iter().enumerate() {
@@ -203,7 +203,7 @@ pub fn csv(report: &Report) -> String {
         let mut values = Vec::new();
         let mut put = |name: &str, value: String| {
             names.push(name.to_owned());
-            values.push(escaped(&value));
+            values.push(value);
         };
         let method = row.method.label();
         put("scene", row.scene.clone());
@@ -269,13 +269,11 @@ pub fn csv(report: &Report) -> String {
         put("mixray", report.mixray.clone());
         put("command", report.command.clone());
         if number == 0 {
-            out += &names.join(",");
-            out.push('\n');
+            records.push(names);
         }
-        out += &values.join(",");
-        out.push('\n');
+        records.push(values);
     }
-    out
+    csv_text(records)
 }
 
 #[cfg(test)]

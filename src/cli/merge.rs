@@ -26,7 +26,7 @@ pub(super) struct Arguments {
     /// Picture to write, .png or .exr with all planes (an incomplete range stays mergeable); may be given several times
     #[arg(short, long, value_name = "OUT", required = true)]
     output: Vec<PathBuf>,
-    /// Scene file [default: where it was when the first part was rendered]
+    /// Scene file [default: where it was, seen from the first part, when that was rendered]
     #[arg(long)]
     scene: Option<PathBuf>,
     #[command(flatten)]
@@ -133,13 +133,17 @@ fn check(parts: &[Part]) -> Result<(), Failure> {
 
 /// The scene as it was rendered.
 fn load(part: &Part, given: Option<&Path>, flags: SceneFlags) -> Result<Scene, Failure> {
-    let path = given.unwrap_or(Path::new(&part.note.scene));
-    if given.is_none() && !path.exists() {
+    let hint = part.note.scene.as_deref().filter(|path| path.is_file());
+    let Some(path) = given.or(hint) else {
+        let place = match &part.note.scene {
+            Some(path) => format!("is no longer at {}", path.display()),
+            None => "has no place in common with the film".to_owned(),
+        };
         return Err(Failure(format!(
-            "the scene is no longer at {}; say where it is with --scene",
-            path.display()
+            "{}: its scene {place}; expected the scene file that it was rendered from; say where it is with --scene",
+            part.path.display()
         )));
-    }
+    };
     let mut scene = flags.load(path)?;
     scene.settings.apply(&part.note.overrides());
     scene.settings.backend = BackendChoice::Cpu;

@@ -1,8 +1,9 @@
-//! A film in an OpenEXR file: its sums to the last bit, beside the planes of any other picture file.
+//! A film in an OpenEXR file: its sums to the last bit, beside the planes of any other picture file, and what it is a part of.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use bytemuck::Zeroable;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::ChannelFile;
 use super::exr_file::{Channels, push_channel, write_layers};
@@ -12,53 +13,93 @@ use crate::renderer::Without;
 use crate::scene::{Choice, Composite, Estimator, Overrides, SamplerKind, Scene, Settings};
 
 /// What a film is a part of: only parts of one render can be put together.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FilmNote {
+    /// Of the program that rendered it.
     pub version: String,
-    /// Where the scene file was.
-    pub scene: String,
-    /// [`Scene::fingerprint`].
+    /// [`Scene::fingerprint`]: this names the scene.
     pub fingerprint: String,
+    /// Where to look for the scene file. In the file it is relative to the film's folder; `None`: there is no way from one to the other.
+    pub scene: Option<PathBuf>,
     /// The samples that every pixel within reach has taken: first and end.
     pub range: (u32, u32),
     /// Rays per pixel of the whole render.
     pub total: u32,
     pub max_bounces: u32,
     pub seed: u32,
+    #[serde(with = "by_name")]
     pub estimator: Estimator,
+    #[serde(with = "by_name")]
     pub sampler: SamplerKind,
+    #[serde(with = "by_name")]
     pub composite: Composite,
     /// Savings that were left out, as far as films show it ([`Without::of_films`]): real rays that edge pixels lack are traced as the others were.
+    #[serde(with = "savings")]
     pub without: Without,
 }
 
-/// Attribute names of [`FilmNote`], in its order.
-const NOTE_NAMES: [&str; 12] = [
-    "mixray.film.version",
-    "mixray.film.scene",
-    "mixray.film.fingerprint",
-    "mixray.film.first",
-    "mixray.film.end",
-    "mixray.film.total",
-    "mixray.film.maxBounces",
-    "mixray.film.seed",
-    "mixray.film.estimator",
-    "mixray.film.sampler",
-    "mixray.film.composite",
-    "mixray.film.without",
-];
-/// Where the savings left out stand in [`NOTE_NAMES`].
-const WITHOUT: usize = 11;
+/// The attribute that holds a [`FilmNote`] as JSON.
+const NOTE: &str = "mixray.film";
+/// The attribute that films of the first form had.
+const NOTE_OF_FORM_1: &str = "mixray.film.version";
+/// The form of note and channels that this program writes and reads.
+const FORM: u32 = 2;
+
+#[derive(Serialize)]
+struct WrittenNote<'a> {
+    form: u32,
+    #[serde(flatten)]
+    note: &'a FilmNote,
+}
+
+#[derive(Deserialize)]
+struct Form {
+    form: u32,
+}
+
+/// Choices by their names.
+mod by_name {
+    use super::*;
+
+    pub(super) fn serialize<T: Choice, S: Serializer>(
+        choice: &T,
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        to.serialize_str(choice.name())
+    }
+
+    pub(super) fn deserialize<'de, T: Choice, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<T, D::Error> {
+        let name = String::deserialize(from)?;
+        let unknown = || serde::de::Error::custom(format!("\"{name}\" is not known"));
+        T::from_name(&name).ok_or_else(unknown)
+    }
+}
+
+/// Savings by their names.
+mod savings {
+    use super::*;
+
+    pub(super) fn serialize<S: Serializer>(without: &Without, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(&without.names())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Without, D::Error> {
+        let names = String::deserialize(from)?;
+        let unknown = || serde::de::Error::custom(format!("the savings \"{names}\" are not known"));
+        Without::from_names(&names).ok_or_else(unknown)
+    }
+}
 
 impl FilmNote {
     /// Of a film that holds these samples of the scene's rays per pixel.
     pub fn new(scene: &Scene, range: (u32, u32), without: Without) -> Self {
-        let path = std::path::absolute(&scene.path).unwrap_or_else(|_| scene.path.clone());
         let settings = &scene.settings;
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            scene: path.display().to_string(),
             fingerprint: scene.fingerprint(),
+            scene: scene.path.canonicalize().ok(),
             range,
             total: settings.rays_per_pixel,
             max_bounces: settings.max_bounces,
@@ -104,47 +145,57 @@ impl FilmNote {
                 (self.fingerprint != other.fingerprint).then(|| {
                     format!(
                         "the films are of different scenes: {} and {}",
-                        self.scene, other.scene
+                        self.fingerprint, other.fingerprint
                     )
                 })
             })
     }
 
-    fn texts(&self) -> [String; 12] {
-        [
-            self.version.clone(),
-            self.scene.clone(),
-            self.fingerprint.clone(),
-            self.range.0.to_string(),
-            self.range.1.to_string(),
-            self.total.to_string(),
-            self.max_bounces.to_string(),
-            self.seed.to_string(),
-            self.estimator.name().to_owned(),
-            self.sampler.name().to_owned(),
-            self.composite.name().to_owned(),
-            self.without.names(),
-        ]
+    /// The note as it stands in a film of that folder.
+    fn to_text(&self, folder: &Path) -> String {
+        let way = |scene: &PathBuf| {
+            let way = pathdiff::diff_paths(scene, folder.canonicalize().ok()?)?;
+            // JSON holds no other.
+            way.to_str().is_some().then_some(way)
+        };
+        let note = Self {
+            scene: self.scene.as_ref().and_then(way),
+            ..self.clone()
+        };
+        let written = WrittenNote {
+            form: FORM,
+            note: &note,
+        };
+        serde_json::to_string(&written).unwrap_or_default()
     }
 
-    fn from_texts(text: &dyn Fn(usize) -> Option<String>, without: Without) -> Option<Self> {
-        let number = |i| text(i)?.parse::<u32>().ok();
-        let note = Self {
-            version: text(0)?,
-            scene: text(1)?,
-            fingerprint: text(2)?,
-            range: (number(3)?, number(4)?),
-            total: number(5)?,
-            max_bounces: number(6)?,
-            seed: number(7)?,
-            estimator: Estimator::from_name(&text(8)?)?,
-            sampler: SamplerKind::from_name(&text(9)?)?,
-            composite: Composite::from_name(&text(10)?)?,
-            without,
+    /// The note of a film in that folder.
+    ///
+    /// # Errors
+    /// What is wrong with it, as "problem; expected; mend".
+    fn from_text(text: &str, folder: &Path) -> Result<Self, String> {
+        let damaged = |what: &str| {
+            format!(
+                "its note is damaged ({what}); expected what `mixray render --range` writes; render it again"
+            )
         };
+        let form: Form = serde_json::from_str(text).map_err(|error| damaged(&error.to_string()))?;
+        if form.form != FORM {
+            return Err(format!(
+                "is a film of form {}; expected form {FORM}; merge it with the program that rendered it, or render it again",
+                form.form
+            ));
+        }
+        let mut note: Self =
+            serde_json::from_str(text).map_err(|error| damaged(&error.to_string()))?;
         let (first, end) = note.range;
-        let is_range = first < end && end <= note.total;
-        (is_range && note.total <= Settings::MAX_RAYS_PER_PIXEL).then_some(note)
+        if !(first < end && end <= note.total && note.total <= Settings::MAX_RAYS_PER_PIXEL) {
+            return Err(damaged(&format!("rays {first}..{end} of {}", note.total)));
+        }
+        // A film from elsewhere names no place of this machine.
+        let hint = note.scene.filter(|scene| scene.is_relative());
+        note.scene = hint.map(|scene| folder.join(scene));
+        Ok(note)
     }
 }
 
@@ -177,56 +228,45 @@ pub fn write_film(
         let hits: Vec<u32> = film.guides.iter().map(|g| g.hits).collect();
         push_channel(&mut channels, GUIDE_HITS, hits);
     }
-    let texts = note.texts();
-    let attributes = NOTE_NAMES.into_iter().zip(texts.iter().map(String::as_str));
-    write_layers(target, picture, planes, metadata, channels, attributes)
+    let text = note.to_text(folder_of(target.path()));
+    write_layers(
+        target,
+        picture,
+        planes,
+        metadata,
+        channels,
+        [(NOTE, text.as_str())].into_iter(),
+    )
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    }
 }
 
 /// The film of a file that [`write_film`] wrote.
 ///
 /// # Errors
-/// In one line: the file cannot be read, or holds no film.
+/// In one line: the file cannot be read, holds no film or one of another form, or sums that are not finite.
 pub fn read_film(path: &Path) -> Result<(Film, FilmNote), String> {
     let file = ChannelFile::read(path)?;
-    if let Some((channel, x, y)) = first_not_finite(&file) {
-        return Err(format!(
-            "{}: {channel} is NaN or infinite at pixel ({x}, {y}); expected the finite sums of `mixray render --range`; render the part again",
-            path.display()
-        ));
-    }
-    let text = |i: usize| file.texts.get(NOTE_NAMES[i]).cloned();
-    // Films had no such attribute before savings could be left out.
-    let names = text(WITHOUT).unwrap_or_default();
-    let without = Without::from_names(&names).ok_or_else(|| {
-        format!(
-            "{}: was rendered without savings that this build does not know ({names}); merge it with the build that rendered it, or render it again",
-            path.display()
-        )
-    })?;
-    let note = FilmNote::from_texts(&text, without);
-    note.and_then(|note| Some((film_of(&file, &note)?, note)))
-        .ok_or_else(|| {
-            format!(
-                "{}: holds no film, only a picture; films come from `mixray render --range`",
-                path.display()
-            )
-        })
+    let refused = |problem: String| format!("{}: {problem}", path.display());
+    let Some(text) = file.texts.get(NOTE) else {
+        return Err(refused(match file.texts.contains_key(NOTE_OF_FORM_1) {
+            true => format!("is a film written by mixray of an earlier form; expected form {FORM}; render it again"),
+            false => "holds no film, only a picture; expected a film; films come from `mixray render --range`".to_owned(),
+        }));
+    };
+    let note = FilmNote::from_text(text, folder_of(path)).map_err(refused)?;
+    let film = film_of(&file, &note).map_err(refused)?;
+    Ok((film, note))
 }
 
-/// A channel of sums and a pixel where it is not finite. No render writes such: a sample that is not finite is counted and left out.
-fn first_not_finite(file: &ChannelFile) -> Option<(&str, usize, usize)> {
-    let sums = file
-        .floats
-        .iter()
-        .filter(|(name, _)| name.starts_with("sums."));
-    sums.into_iter().find_map(|(name, samples)| {
-        let index = samples.iter().position(|sample| !sample.is_finite())?;
-        let width = file.width as usize;
-        Some((name.as_str(), index % width, index / width))
-    })
-}
-
-fn film_of(file: &ChannelFile, note: &FilmNote) -> Option<Film> {
+/// # Errors
+/// As "problem; expected; mend": a channel is missing, or holds a value that is not finite.
+fn film_of(file: &ChannelFile, note: &FilmNote) -> Result<Film, String> {
     let count = file.width as usize * file.height as usize;
     let mut film = Film {
         width: file.width,
@@ -236,30 +276,47 @@ fn film_of(file: &ChannelFile, note: &FilmNote) -> Option<Film> {
         guides: Vec::new(),
     };
     for (name, _, set) in float_fields() {
-        let samples = file.floats.get(&name)?;
-        for (pixel, sample) in film.pixels.iter_mut().zip(samples) {
-            set(pixel, *sample);
-        }
+        fill(&mut film.pixels, finite(file, &name)?, set);
     }
     for (name, _, set) in count_fields() {
-        let samples = file.counts.get(name)?;
-        for (pixel, sample) in film.pixels.iter_mut().zip(samples) {
-            set(pixel, *sample);
-        }
+        let samples = file.counts.get(name).ok_or_else(|| missing(name))?;
+        fill(&mut film.pixels, samples, set);
     }
     if let Some(hits) = file.counts.get(GUIDE_HITS) {
         film.guides = vec![GuideSums::zeroed(); count];
-        for (guide, hits) in film.guides.iter_mut().zip(hits) {
-            guide.hits = *hits;
-        }
+        fill(&mut film.guides, hits, |guide, hits| guide.hits = hits);
         for (name, _, set) in guide_fields() {
-            let samples = file.floats.get(&name)?;
-            for (guide, sample) in film.guides.iter_mut().zip(samples) {
-                set(guide, *sample);
-            }
+            fill(&mut film.guides, finite(file, &name)?, set);
         }
     }
-    Some(film)
+    Ok(film)
+}
+
+fn fill<R, T: Copy>(records: &mut [R], samples: &[T], set: impl Fn(&mut R, T)) {
+    for (record, sample) in records.iter_mut().zip(samples) {
+        set(record, *sample);
+    }
+}
+
+/// Sums are finite, as samples that are not are kept out of them.
+fn finite<'a>(file: &'a ChannelFile, name: &str) -> Result<&'a [f32], String> {
+    let samples = file.floats.get(name).ok_or_else(|| missing(name))?;
+    match samples.iter().position(|sample| !sample.is_finite()) {
+        None => Ok(samples),
+        Some(at) => {
+            let (x, y) = (at % file.width as usize, at / file.width as usize);
+            Err(format!(
+                "{name} of pixel ({x}, {y}) is {}; expected finite sums; the film is damaged: render it again",
+                samples[at]
+            ))
+        }
+    }
+}
+
+fn missing(name: &str) -> String {
+    format!(
+        "the film has no channel {name}; expected all of its sums; the film is damaged: render it again"
+    )
 }
 
 const GUIDE_HITS: &str = "sums.hits.Y";
@@ -390,8 +447,8 @@ mod tests {
     fn note() -> FilmNote {
         FilmNote {
             version: "1.2.3".into(),
-            scene: "/a b/ü.toml".into(),
             fingerprint: "0123456789abcdef".into(),
+            scene: None,
             range: (7, 47),
             total: 100,
             max_bounces: 3,
@@ -453,14 +510,77 @@ mod tests {
         assert_eq!(read_film(target.path()).unwrap().0, plain);
     }
 
+    /// The note holds the way from the film to the scene; both may move together.
     #[test]
-    fn a_note_without_savings_leaves_none_out() {
-        let texts = note().texts();
-        let text = |i: usize| texts.get(i).cloned();
-        let read = FilmNote::from_texts(&text, Without::default()).unwrap();
-        assert_eq!(read.without, Without::default());
-        assert!(read.mismatch(&note()).is_some(), "control");
-        assert_eq!(Without::from_names(""), Some(Without::default()));
+    fn the_scene_is_looked_for_beside_the_film() {
+        let root = tempfile::tempdir().unwrap();
+        let (scenes, films) = (root.path().join("ü scenes"), root.path().join("films"));
+        for folder in [&scenes, &films] {
+            std::fs::create_dir(folder).unwrap();
+        }
+        let scene = scenes.join("a.toml");
+        std::fs::write(&scene, "").unwrap();
+        let here = FilmNote {
+            scene: scene.canonicalize().ok(),
+            ..note()
+        };
+        let text = here.to_text(&films);
+        assert!(!text.contains(&*root.path().to_string_lossy()), "{text}");
+        let found = FilmNote::from_text(&text, &films).unwrap().scene.unwrap();
+        assert_eq!(found.canonicalize().ok(), here.scene);
+        let elsewhere = FilmNote::from_text(&text, Path::new("/moved/films")).unwrap();
+        assert_eq!(
+            elsewhere.scene,
+            Some("/moved/films/../ü scenes/a.toml".into())
+        );
+        let absolute = text.replace("../ü scenes", "/etc");
+        assert_eq!(FilmNote::from_text(&absolute, &films).unwrap().scene, None);
+    }
+
+    #[test]
+    fn notes_that_this_program_did_not_write_are_refused() {
+        let text = note().to_text(Path::new("."));
+        let read = |text: &str| FilmNote::from_text(text, Path::new("."));
+        assert_eq!(read(&text), Ok(note()), "control");
+        for (from, to, part) in [
+            ("\"form\":2", "\"form\":3", "form 3; expected form 2"),
+            ("\"form\":2,", "", "missing field `form`"),
+            ("\"paper\"", "\"papers\"", "\"papers\" is not known"),
+            ("plan", "plans", "plans"),
+            ("[7,47]", "[47,7]", "rays 47..7 of 100"),
+            ("[7,47]", "[7,101]", "rays 7..101 of 100"),
+            ("\"seed\":4294967295", "\"seed\":4294967296", "u32"),
+        ] {
+            assert!(text.contains(from), "{text} lacks {from}");
+            let message = read(&text.replace(from, to)).unwrap_err();
+            assert!(message.contains(part), "{message}");
+        }
+    }
+
+    #[test]
+    fn sums_that_are_not_finite_are_refused() {
+        type Damage = fn(&mut Film);
+        let damages: [(&str, Damage); 4] = [
+            ("sums.m_im.hi.G of pixel (1, 1) is NaN", |f| {
+                f.pixels[4].m_im.hi[1] = f32::NAN
+            }),
+            ("sums.sq.lo.B of pixel (2, 0) is inf", |f| {
+                f.pixels[2].sq.lo[2] = f32::INFINITY
+            }),
+            ("sums.r_ir.hi.R of pixel (0, 0) is -inf", |f| {
+                f.pixels[0].r_ir.hi[0] = f32::NEG_INFINITY
+            }),
+            ("sums.depth.hi.Z of pixel (0, 1) is NaN", |f| {
+                f.guides[3].depth_hi = f32::NAN
+            }),
+        ];
+        for (part, damage) in damages {
+            let mut film = film();
+            damage(&mut film);
+            let (_folder, target) = written(&film);
+            let message = read_film(target.path()).unwrap_err();
+            assert!(message.contains(part), "{message}");
+        }
     }
 
     #[test]

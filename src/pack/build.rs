@@ -19,7 +19,7 @@ use crate::scene::{
     EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind, Scene, Side,
 };
 
-/// The anchor is kept while the camera stays within this distance of it, as a share of the distance that f32 resolves to 1e-7.
+/// The anchor is kept while the camera stays within this distance of it: f32 resolves 1 m to 1e-7 m.
 const ANCHOR_REACH_M: f64 = 1.0;
 
 #[derive(Debug, thiserror::Error)]

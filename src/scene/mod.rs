@@ -32,7 +32,7 @@ pub mod trajectory;
 pub use crate::stages::settings::*;
 pub use error::SceneError;
 pub use file::{Given, load, load_with};
-pub use fingerprint::fingerprint_of;
+pub use fingerprint::{Content, ContentHash};
 pub use photo::read_codes;
 pub use reader::Choice;
 pub use settings::Overrides;

@@ -4,6 +4,7 @@ use glam::{DMat4, DQuat, DVec3};
 
 use super::Scene;
 use super::error::Result;
+use super::fingerprint::content;
 use super::pose::{read_camera_pose, read_placement};
 use super::reader::{Node, Table, is_not_negative};
 use super::trajectory::CameraPath;
@@ -57,6 +58,10 @@ pub struct ObjectMotion {
     /// World-from-object without the motion.
     rest: DMat4,
     keys: Vec<MotionKey>,
+}
+
+content! {
+    ObjectMotion { rest, keys }
 }
 
 impl ObjectMotion {

@@ -207,14 +207,24 @@ fn read_points(path: &Path) -> Result<Vec<KnownPoint>, SequenceError> {
         ))
     })?;
     let mut points = Vec::new();
-    for (index, line) in text.lines().enumerate() {
-        let words: Vec<&str> = line.split(',').map(str::trim).collect();
-        if line.trim().is_empty() || line.starts_with('#') || (index == 0 && words[0] == "frame") {
+    let mut table = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    for (index, record) in table.records().enumerate() {
+        let record = record.map_err(|error| failure(index + 1, error.to_string()))?;
+        let line = record
+            .position()
+            .map_or(0, |position| position.line() as usize);
+        let words: Vec<&str> = record.iter().collect();
+        if words == [""] || (index == 0 && words[0] == "frame") {
             continue;
         }
         let [frame, x_px, y_px, x, y, z] = words.as_slice() else {
             return Err(failure(
-                index + 1,
+                line,
                 format!(
                     "it has {} columns; expected frame,x_px,y_px,x_m,y_m,z_m; complete the line",
                     words.len()
@@ -224,7 +234,7 @@ fn read_points(path: &Path) -> Result<Vec<KnownPoint>, SequenceError> {
         let number = |word: &str| match word.parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(x),
             _ => Err(failure(
-                index + 1,
+                line,
                 format!(
                     "\"{word}\" is no finite number; expected frame,x_px,y_px,x_m,y_m,z_m; correct the line"
                 ),
@@ -239,7 +249,7 @@ fn read_points(path: &Path) -> Result<Vec<KnownPoint>, SequenceError> {
                 Ok(number) => EntryKey::Number(number),
                 Err(_) => EntryKey::Name((*frame).to_owned()),
             },
-            place: format!("line {}", index + 1),
+            place: format!("line {line}"),
             world: DVec3::new(number(x)?, number(y)?, number(z)?),
             seen,
         });

@@ -8,13 +8,14 @@ use glam::DVec3;
 use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
 use super::report::{FrameCounts, SequenceSeconds, SequenceStats};
 use super::{Event, SequenceError, SequenceOptions};
+use crate::output::PngBits;
 use crate::pack::next_anchor;
 use crate::renderer::{
     Budget, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
 };
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{
-    BackendChoice, Camera, Exposure, Lens, MotionBlurMethod, Scene, fingerprint_of,
+    BackendChoice, Camera, Content, ContentHash, Exposure, Lens, MotionBlurMethod, Scene,
 };
 use crate::stages::{Finished, GpuStages, finish};
 use crate::video::{FrameSink, FrameSource, Header, SinkPlan, VideoFrame};
@@ -315,33 +316,9 @@ impl Sequence<'_> {
         // The photograph of the moment is no part of what the frames are made with.
         scene.photo = None;
         let options = self.options;
-        let fits = scene.settings.exposure == Exposure::Auto;
-        // A file tells by their order which frames it holds.
-        let is_file = options.output.extension().is_some_and(|e| e == "y4m");
-        let scope = match fits || options.focus_pull_m.is_some() || is_file {
-            true => format!("{:?} {:?}", options.range, self.span),
-            false => String::new(),
-        };
-        let poses = &self.files.trajectory;
-        let trajectory = format!(
-            "{:?} {:?} {:?} {:?}",
-            poses.entries, poses.intrinsics, self.files.intrinsics, self.rate
-        );
-        let may_be_gpu = scene.settings.backend != BackendChoice::Cpu;
-        let without = options.without.of_pictures(may_be_gpu);
-        let fingerprint = fingerprint_of([
-            env!("CARGO_PKG_VERSION"),
-            &scene.fingerprint(),
-            &format!(
-                "{:?} {:?} {:?} {without:?}",
-                scene.settings, scene.stages, options.png_bits
-            ),
-            &trajectory,
-            &format!("{:?} {scope}", options.focus_pull_m),
-        ]);
         let sink = FrameSink::open(SinkPlan {
             path: &options.output,
-            fingerprint,
+            fingerprint: self.fingerprint(&scene),
             header: header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate)),
             png_bits: options.png_bits,
             overwrite: options.overwrite,
@@ -359,6 +336,28 @@ impl Sequence<'_> {
             anchor: None,
             notes: 0,
         })
+    }
+
+    /// Of all that the frames are made with but the photographs.
+    fn fingerprint(&self, scene: &Scene) -> String {
+        let options = self.options;
+        let poses = &self.files.trajectory;
+        let settings = &scene.settings;
+        let may_be_gpu = settings.backend != BackendChoice::Cpu;
+        let without = options.without.of_pictures(may_be_gpu);
+        let png_bits = (options.png_bits).map(|bits| bits == PngBits::Sixteen);
+        // What is fitted or pulled over the frames depends on which there are; a file tells by their order which it holds.
+        let fits = settings.exposure == Exposure::Auto;
+        let is_file = options.output.extension().is_some_and(|e| e == "y4m");
+        let scope = (fits || options.focus_pull_m.is_some() || is_file)
+            .then_some((options.range, self.span));
+        let mut hash = ContentHash::default();
+        (env!("CARGO_PKG_VERSION"), scene.fingerprint()).add_to(&mut hash);
+        (settings, &scene.stages).add_to(&mut hash);
+        (without.names(), png_bits).add_to(&mut hash);
+        (&poses.entries, (poses.intrinsics, self.files.intrinsics)).add_to(&mut hash);
+        (self.rate, (options.focus_pull_m, scope)).add_to(&mut hash);
+        hash.finish()
     }
 
     fn end(self, complete: bool) -> Result<RenderedSequence, SequenceError> {

@@ -65,9 +65,22 @@ fn cannot_write(error: &std::io::Error) -> String {
     )
 }
 
-/// Frames of another render are there.
-fn foreign(path: &Path) -> VideoError {
-    Place::File(path.into()).error(
+/// Frames of another render are there. `mark` is what stands with them, where this program leaves its fingerprint.
+fn foreign(path: &Path, mark: &str) -> VideoError {
+    let place = Place::File(path.into());
+    if has_earlier_fingerprint(mark) {
+        return place.error("it holds frames written by mixray of an earlier form; expected a new place; render it again, to another or with --overwrite");
+    }
+    place.error(
         "it holds frames of another render (another scene, trajectory or option, or none of this program's); expected a new place or the same render; name another, or replace them with --overwrite",
     )
+}
+
+/// Fingerprints had 16 digits once.
+fn has_earlier_fingerprint(mark: &str) -> bool {
+    let fingerprint = ["\"fingerprint\": \"", " XMIXRAY="]
+        .iter()
+        .find_map(|before| Some(mark.split_once(before)?.1));
+    let digits = |rest: &str| rest.chars().take_while(char::is_ascii_hexdigit).count();
+    fingerprint.is_some_and(|rest| digits(rest) == 16)
 }

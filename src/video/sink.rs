@@ -208,7 +208,8 @@ fn open_folder(plan: &SinkPlan<'_>) -> Result<PathBuf, VideoError> {
         false => own.contains(output),
     });
     let note = format!("{{\n  \"fingerprint\": \"{}\"\n}}\n", plan.fingerprint);
-    if std::fs::read_to_string(&note_path).is_ok_and(|text| text == note) {
+    let found = std::fs::read_to_string(&note_path).unwrap_or_default();
+    if found == note {
         return Ok(folder);
     }
     let entries = std::fs::read_dir(&folder).map_err(|error| place.error(cannot_write(&error)))?;
@@ -217,7 +218,7 @@ fn open_folder(plan: &SinkPlan<'_>) -> Result<PathBuf, VideoError> {
         .filter(|path| path.extension().is_some_and(|e| e == "png"))
         .collect();
     if !others.is_empty() && !plan.overwrite {
-        return Err(foreign(plan.path));
+        return Err(foreign(plan.path, &found));
     }
     for path in &others {
         files::before_write(path).map_err(OutputError::from)?;
@@ -278,6 +279,23 @@ mod tests {
             photo: Photo::from_srgb8(5, 4, vec![codes; 20]),
             pixels,
             warnings: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn frames_of_an_earlier_form_are_told() {
+        for (mark, earlier) in [
+            ("{\n  \"fingerprint\": \"0123456789abcdef\"\n}\n", true),
+            ("YUV4MPEG2 W48 H36 F10:1 XMIXRAY=0123456789abcdef\n", true),
+            (
+                "YUV4MPEG2 W48 H36 XMIXRAY=0123456789abcdef0123456789abcdef\n",
+                false,
+            ),
+            ("YUV4MPEG2 W48 H36 F10:1\n", false),
+            ("", false),
+        ] {
+            let message = foreign(Path::new("out"), mark).to_string();
+            assert_eq!(message.contains("of an earlier form"), earlier, "{message}");
         }
     }
 

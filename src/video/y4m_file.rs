@@ -82,7 +82,7 @@ impl Y4mFile {
             let is_torn = line.as_bytes().starts_with(&begin) || begin.iter().all(|b| *b == 0);
             return match is_torn {
                 true => Ok(None),
-                false => Err(foreign(path)),
+                false => Err(foreign(path, &String::from_utf8_lossy(&begin))),
             };
         }
         let mut frames = Frames::default();

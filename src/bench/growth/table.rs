@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::{Curve, Law, SLACK};
+use super::{Curve, Law, Point, SLACK};
 use crate::bench::Machine;
-use crate::bench::columns::aligned;
+use crate::bench::columns::{aligned, csv_text};
 use crate::bench::fit::Fit;
 use crate::scene::Choice;
 
@@ -162,26 +162,27 @@ pub fn growth_markdown(command: &str, machine: &Machine, curves: &[Curve]) -> St
 
 /// One line a size.
 pub fn growth_csv(curves: &[Curve]) -> String {
-    let mut out = "law,timed,unit,method,device,cost,work,secs,runs,rays\n".to_owned();
-    for curve in curves {
-        for point in &curve.points {
-            let _ = writeln!(
-                out,
-                "{},{},{},{},\"{}\",{},{},{:.9},{},{}",
-                curve.law.name(),
-                curve.law.timed(),
-                curve.law.unit(),
-                curve.method,
-                curve.device.replace('"', "\"\""),
-                curve.cost,
-                point.work,
-                point.secs,
-                point.runs.len(),
-                point.rays
-            );
-        }
-    }
-    out
+    let names = [
+        "law", "timed", "unit", "method", "device", "cost", "work", "secs", "runs", "rays",
+    ];
+    let of_point = |curve: &Curve, point: &Point| {
+        vec![
+            curve.law.name().to_owned(),
+            curve.law.timed().to_owned(),
+            curve.law.unit().to_owned(),
+            curve.method.clone(),
+            curve.device.clone(),
+            curve.cost.to_owned(),
+            point.work.to_string(),
+            format!("{:.9}", point.secs),
+            point.runs.len().to_string(),
+            point.rays.to_string(),
+        ]
+    };
+    let points = curves
+        .iter()
+        .flat_map(|curve| curve.points.iter().map(move |point| of_point(curve, point)));
+    csv_text(std::iter::once(names.map(str::to_owned).to_vec()).chain(points))
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::Case;
 use crate::bench::Machine;
-use crate::bench::columns::{aligned, escaped};
+use crate::bench::columns::{aligned, csv_text};
 
 /// One case at one setting on one backend.
 #[derive(Clone, Debug, Serialize)]
@@ -181,11 +181,20 @@ pub fn markdown(report: &Report, cases: &[Case]) -> String {
 
 /// One line a figure, under a line of names.
 pub fn csv(report: &Report) -> String {
-    let mut out = String::from(
-        "case,setting,backend,quantity,measured,bound,passed,non_finite_samples,first_non_finite,seconds\n",
-    );
-    for figure in &report.figures {
-        let values = [
+    let names = [
+        "case",
+        "setting",
+        "backend",
+        "quantity",
+        "measured",
+        "bound",
+        "passed",
+        "non_finite_samples",
+        "first_non_finite",
+        "seconds",
+    ];
+    let figures = report.figures.iter().map(|figure| {
+        vec![
             figure.case.clone(),
             figure.setting.clone(),
             figure.backend.clone(),
@@ -196,8 +205,7 @@ pub fn csv(report: &Report) -> String {
             figure.non_finite_samples.to_string(),
             figure.first_non_finite.clone().unwrap_or_default(),
             figure.seconds.to_string(),
-        ];
-        let _ = writeln!(out, "{}", values.map(|v| escaped(&v)).join(","));
-    }
-    out
+        ]
+    });
+    csv_text(std::iter::once(names.map(str::to_owned).to_vec()).chain(figures))
 }

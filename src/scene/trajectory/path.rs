@@ -2,12 +2,18 @@
 
 use glam::{DMat4, DQuat, DVec3};
 
+use crate::scene::fingerprint::content;
+
 /// Poses at times. Between two of them the position moves along a straight line and the orientation turns at a constant rate; beyond the
 /// ends the last motion goes on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CameraPath {
     /// Seconds, rising, with world-from-camera.
     keys: Vec<(f64, DMat4)>,
+}
+
+content! {
+    CameraPath { keys }
 }
 
 impl CameraPath {

@@ -1,0 +1,52 @@
+//! Fingerprints tell scenes apart by what they hold.
+
+mod content;
+mod parts;
+#[cfg(test)]
+mod tests;
+
+pub(super) use content::content;
+pub use content::{Content, ContentHash};
+
+use super::{Scene, Settings};
+
+impl Scene {
+    /// 32 hexadecimal digits of everything that the converged film depends on, contents of all files included: geometry, materials, textures,
+    /// photograph, lights, camera, lens, exposure, path depth. How it is sampled (rays per pixel, seed, estimator, sampler, backend), the
+    /// composite, the camera stages, names and places on disk do not matter. The same on every machine.
+    pub fn fingerprint(&self) -> String {
+        let mut hash = ContentHash::default();
+        let Settings {
+            max_bounces,
+            clamp_indirect,
+            exposure,
+            rays_per_pixel: _,
+            seed: _,
+            estimator: _,
+            sampler: _,
+            composite: _,
+            backend: _,
+        } = &self.settings;
+        let Self {
+            name: _,
+            path: _,
+            inputs: _,
+            stages: _,
+            photo,
+            camera,
+            lens,
+            environment,
+            lights,
+            objects,
+            shutter,
+            camera_path,
+            settings: _,
+            warnings: _,
+        } = self;
+        (max_bounces, (clamp_indirect, exposure)).add_to(&mut hash);
+        (photo, (camera, lens)).add_to(&mut hash);
+        (environment, lights).add_to(&mut hash);
+        (objects, (shutter, camera_path)).add_to(&mut hash);
+        hash.finish()
+    }
+}
