@@ -219,7 +219,7 @@ const TRACES: &[Trace] = &[
     },
     Trace {
         feature: "paper",
-        with: &["fn cpu_estimator__paper_behind", ".radiance_real"],
+        with: &["fn cpu_estimator__paper_behind", "path_radiances_real"],
         without: &[
             "fn cpu_estimator__primary_virtual",
             "fn cpu_estimator__difference_shadow",
@@ -234,7 +234,7 @@ const TRACES: &[Trace] = &[
     Trace {
         feature: "paper",
         kernel: "kernel_accumulate",
-        with: &[".radiance_real"],
+        with: &["path_radiances_real"],
         ..ADVANCE
     },
     Trace {
