@@ -1,16 +1,5 @@
 // Twin of src/math.rs: the same operations in the same order.
 
-const PI: f32 = 3.14159265;
-const FRAC_PI_2: f32 = 1.57079633;
-const FRAC_PI_4: f32 = 0.785398163;
-const TAU: f32 = 6.28318531;
-const TAN_PI_8: f32 = 0.41421357;
-const SQRT_2: f32 = 1.41421356;
-const LOG2_E: f32 = 1.44269504;
-const LN_2: f32 = 0.693147181;
-const LN_2_HI: f32 = 0.69314575;
-const LN_2_LO: f32 = 1.4286068e-6;
-const MIN_NORMAL: f32 = 1.17549435e-38;
 
 struct SinCos {
     sin: f32,

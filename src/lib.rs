@@ -26,6 +26,7 @@ pub mod cli;
 mod clock;
 pub mod cpu;
 mod decode;
+pub mod files;
 pub mod film;
 pub mod gpu;
 pub mod light;

@@ -6,18 +6,24 @@
 
 use glam::Vec3;
 
-const PI: f32 = std::f32::consts::PI;
-const FRAC_PI_2: f32 = std::f32::consts::FRAC_PI_2;
-const FRAC_PI_4: f32 = std::f32::consts::FRAC_PI_4;
-const TAU: f32 = std::f32::consts::TAU;
-const TAN_PI_8: f32 = 0.414_213_57;
-const SQRT_2: f32 = std::f32::consts::SQRT_2;
-const LOG2_E: f32 = std::f32::consts::LOG2_E;
-const LN_2: f32 = std::f32::consts::LN_2;
-/// ln 2 in two parts: the first has 15 bits, so that its product with an exponent is exact.
-const LN_2_HI: f32 = 0.693_145_75;
-const LN_2_LO: f32 = 1.428_606_8e-6;
-const MIN_NORMAL: f32 = f32::MIN_POSITIVE;
+use crate::shared::shared;
+
+shared! {
+    pub const PI: f32 = std::f32::consts::PI;
+    pub const INV_PI: f32 = std::f32::consts::FRAC_1_PI;
+    pub const INV_TAU: f32 = 0.159_154_94;
+    const FRAC_PI_2: f32 = std::f32::consts::FRAC_PI_2;
+    const FRAC_PI_4: f32 = std::f32::consts::FRAC_PI_4;
+    pub const TAU: f32 = std::f32::consts::TAU;
+    const TAN_PI_8: f32 = 0.414_213_57;
+    const SQRT_2: f32 = std::f32::consts::SQRT_2;
+    const LOG2_E: f32 = std::f32::consts::LOG2_E;
+    const LN_2: f32 = std::f32::consts::LN_2;
+    /// ln 2 in two parts: the first has 15 bits, so that its product with an exponent is exact.
+    const LN_2_HI: f32 = 0.693_145_75;
+    const LN_2_LO: f32 = 1.428_606_8e-6;
+    const MIN_NORMAL: f32 = f32::MIN_POSITIVE;
+}
 
 /// Sine and cosine of `2 pi x`, for |x| <= 2^20 turns. Absolute error at most 1.2e-7; exact at multiples of a quarter turn.
 pub fn sincos_2pi(x: f32) -> (f32, f32) {

@@ -38,22 +38,39 @@ pub trait SharedValue {
 }
 
 /// The value of a constant as WGSL has it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     U32(u32),
     I32(i32),
     F32(f32),
     Vec3([f32; 3]),
+    U32s(Vec<u32>),
+    F32s(Vec<f32>),
 }
 
 impl Value {
     /// Type and literal; the literal has the very bits.
-    fn wgsl(self) -> (&'static str, String) {
+    fn wgsl(&self) -> (String, String) {
+        let composed = |kind: String, parts: Vec<String>| {
+            let value = format!("{kind}({})", parts.join(", "));
+            (kind, value)
+        };
         match self {
-            Self::U32(x) => ("u32", format!("{x}u")),
-            Self::I32(x) => ("i32", format!("{x}i")),
-            Self::F32(x) => ("f32", format!("{x:?}f")),
-            Self::Vec3([x, y, z]) => ("vec3<f32>", format!("vec3<f32>({x:?}f, {y:?}f, {z:?}f)")),
+            Self::U32(x) => ("u32".to_owned(), format!("{x}u")),
+            Self::I32(x) => ("i32".to_owned(), format!("{x}i")),
+            Self::F32(x) => ("f32".to_owned(), format!("{x:?}f")),
+            Self::Vec3(parts) => composed(
+                "vec3<f32>".to_owned(),
+                parts.iter().map(|x| format!("{x:?}f")).collect(),
+            ),
+            Self::U32s(parts) => composed(
+                format!("array<u32, {}>", parts.len()),
+                parts.iter().map(|x| format!("{x}u")).collect(),
+            ),
+            Self::F32s(parts) => composed(
+                format!("array<f32, {}>", parts.len()),
+                parts.iter().map(|x| format!("{x:?}f")).collect(),
+            ),
         }
     }
 }
@@ -188,9 +205,21 @@ impl SharedValue for f32 {
     }
 }
 
-impl SharedValue for [f32; 3] {
+impl SharedValue for glam::Vec3 {
     fn value(self) -> Value {
-        Value::Vec3(self)
+        Value::Vec3(self.to_array())
+    }
+}
+
+impl<const N: usize> SharedValue for [f32; N] {
+    fn value(self) -> Value {
+        Value::F32s(self.to_vec())
+    }
+}
+
+impl<const N: usize> SharedValue for [u32; N] {
+    fn value(self) -> Value {
+        Value::U32s(self.to_vec())
     }
 }
 

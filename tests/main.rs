@@ -3,9 +3,11 @@
 mod backends;
 mod bench;
 mod cli;
+mod faults;
 mod gltf;
 mod gltf_pictures;
 mod invariants;
+mod overwriting;
 mod references;
 mod scenes;
 mod sequence;

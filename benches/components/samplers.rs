@@ -3,7 +3,8 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput};
-use mixray::camera::sampler::{SAMPLER_CMJ, SAMPLER_JITTERED, SAMPLER_SOBOL, SampleKey, sample_4d};
+use mixray::camera::sampler::{SampleKey, sample_4d};
+use mixray::packed::{SAMPLER_CMJ, SAMPLER_JITTERED, SAMPLER_SOBOL};
 
 use crate::processor_time::ProcessorTime;
 

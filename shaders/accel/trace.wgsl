@@ -15,14 +15,6 @@ struct Ray {
     skip: u32,
 }
 
-// The point is (1 - u - v) * v0 + u * v1 + v * v2; a miss has t infinite and triangle NONE.
-struct Hit {
-    t: f32,
-    u: f32,
-    v: f32,
-    triangle: u32,
-}
-
 const WORKGROUP_THREADS: u32 = 64u;
 // Levels of a tree, MAX_LEVELS in src/accel/compressed.rs: each leaves at most one group of children waiting.
 const TRACE_STACK: u32 = 24u;

@@ -1,13 +1,10 @@
 // Twin of the f32 half of src/camera/lens.rs: the same operations in the same order.
 
 import package::gpu::buffers::frame;
-import package::math::{dot3, normalize3, sincos_2pi};
+import package::packed::records::{APERTURE_DISC, APERTURE_SQUARE};
+import package::math::{INV_TAU, dot3, normalize3, sincos_2pi};
 import package::camera::shutter::{CameraPose, camera_pose};
 
-const APERTURE_DISC: u32 = 0u;
-const APERTURE_SQUARE: u32 = 1u;
-const UNDISTORT_STEPS: u32 = 8u;
-const INV_TAU: f32 = 0.15915494;
 
 struct CameraRay {
     origin: vec3<f32>,

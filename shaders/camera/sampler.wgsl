@@ -1,10 +1,8 @@
 // Twin of src/camera/sampler.rs: integer arithmetic up to the last conversion, equal bit for bit.
 
+import package::packed::records::{SAMPLER_CMJ, SAMPLER_JITTERED};
 import package::math::{hash_combine, hash_u32, uniform_from_bits};
 
-const SAMPLER_JITTERED: u32 = 0u;
-const SAMPLER_CMJ: u32 = 1u;
-const MAX_TOTAL: u32 = 1073741824u;
 
 struct SampleKey {
     pixel: u32,
@@ -14,22 +12,82 @@ struct SampleKey {
     sampler: u32,
 }
 
-fn sample_4d(key: SampleKey, set_id: u32) -> vec4<f32> {
+// The four numbers of one set, computed when they are asked for.
+struct SampleSet {
+    key: SampleKey,
+    stream: u32,
+    point: u32,
+    order: vec4<u32>,
+}
+
+fn sample_set(key: SampleKey, set_id: u32) -> SampleSet {
     let stream = hash_combine(hash_combine(key.seed, key.pixel), set_id);
-    var bits: vec4<u32>;
-    if key.sampler == SAMPLER_JITTERED {
-        bits = stratified_4d(stream, key.index, key.total, false);
-    } else if key.sampler == SAMPLER_CMJ {
-        bits = stratified_4d(stream, key.index, key.total, true);
-    } else {
-        bits = sobol_4d(stream, key.index, set_id);
+    if set_id == 0u {
+        return SampleSet(key, stream, key.index, vec4<u32>(1u, 3u, 0u, 2u));
     }
-    return vec4<f32>(
-        uniform_from_bits(bits.x),
-        uniform_from_bits(bits.y),
-        uniform_from_bits(bits.z),
-        uniform_from_bits(bits.w),
-    );
+    let seed = hash_u32(stream ^ 0x3c6ef372u);
+    let shuffled = owen_scramble(reverseBits(key.index), seed);
+    return SampleSet(key, stream, reverseBits(shuffled), vec4<u32>(0u, 1u, 2u, 3u));
+}
+
+fn pair(set: SampleSet) -> vec2<f32> {
+    var bits: vec2<u32>;
+    if is_grid(set) {
+        bits = grid_pair(set, 0u);
+    } else {
+        bits = vec2<u32>(sobol(set, 0u), sobol(set, 1u));
+    }
+    return vec2<f32>(uniform_from_bits(bits.x), uniform_from_bits(bits.y));
+}
+
+fn second_pair(set: SampleSet) -> vec2<f32> {
+    var bits: vec2<u32>;
+    if is_grid(set) {
+        bits = grid_pair(set, 1u);
+    } else {
+        bits = vec2<u32>(sobol(set, 2u), sobol(set, 3u));
+    }
+    return vec2<f32>(uniform_from_bits(bits.x), uniform_from_bits(bits.y));
+}
+
+fn third(set: SampleSet) -> f32 {
+    if is_grid(set) {
+        return uniform_from_bits(grid_pair(set, 1u).x);
+    }
+    return uniform_from_bits(sobol(set, 2u));
+}
+
+fn fourth(set: SampleSet) -> f32 {
+    if is_grid(set) {
+        return uniform_from_bits(grid_pair(set, 1u).y);
+    }
+    return uniform_from_bits(sobol(set, 3u));
+}
+
+fn is_grid(set: SampleSet) -> bool {
+    return set.key.sampler == SAMPLER_JITTERED || set.key.sampler == SAMPLER_CMJ;
+}
+
+fn grid_pair(set: SampleSet, pair: u32) -> vec2<u32> {
+    let samples = clamp(set.key.total, 1u, MAX_TOTAL);
+    let columns = strata_columns(samples);
+    let grid = Grid(columns, (samples + columns - 1u) / columns, set.key.sampler == SAMPLER_CMJ);
+    let jitter = hash_combine(set.stream, set.key.index);
+    if pair == 0u {
+        return grid_point(grid, set.stream ^ 0x2c1b3c6du, set.key.index, jitter);
+    }
+    return grid_point(grid, set.stream ^ 0x297a2d39u, set.key.index, hash_u32(jitter ^ 0x6b43a9b5u));
+}
+
+fn sobol(set: SampleSet, number: u32) -> u32 {
+    let seeds = vec4<u32>(SOBOL_SEEDS[0], SOBOL_SEEDS[1], SOBOL_SEEDS[2], SOBOL_SEEDS[3]);
+    let seed = hash_u32(set.stream ^ seeds[number]);
+    return reverseBits(owen_scramble(sobol_reversed(set.point, set.order[number]), seed));
+}
+
+fn sample_4d(key: SampleKey, set_id: u32) -> vec4<f32> {
+    let set = sample_set(key, set_id);
+    return vec4<f32>(pair(set), second_pair(set));
 }
 
 fn strata_columns(total: u32) -> u32 {
@@ -43,38 +101,23 @@ fn strata_columns(total: u32) -> u32 {
     return n;
 }
 
-fn stratified_4d(stream: u32, index: u32, total: u32, correlated: bool) -> vec4<u32> {
-    let samples = clamp(total, 1u, MAX_TOTAL);
-    let columns = strata_columns(samples);
-    let rows = (samples + columns - 1u) / columns;
-    let jitter = hash_combine(stream, index);
-    let a = stratified_pair(stream ^ 0x2c1b3c6du, index, columns, rows, jitter, correlated);
-    let b = stratified_pair(
-        stream ^ 0x297a2d39u,
-        index,
-        columns,
-        rows,
-        hash_u32(jitter ^ 0x6b43a9b5u),
-        correlated,
-    );
-    return vec4<u32>(a.x, a.y, b.x, b.y);
-}
-
-fn stratified_pair(
-    stream: u32,
-    index: u32,
+// Cells that share the unit square among a pixel's samples.
+struct Grid {
     columns: u32,
     rows: u32,
-    jitter: u32,
     correlated: bool,
-) -> vec2<u32> {
+}
+
+fn grid_point(grid: Grid, stream: u32, index: u32, jitter: u32) -> vec2<u32> {
+    let columns = grid.columns;
+    let rows = grid.rows;
     let cells = columns * rows;
     let cell = permute(index % cells, cells, hash_u32(stream ^ 0x8f7439b1u));
     let column = cell % columns;
     let row = cell / columns;
     var x = hash_u32(jitter ^ 0x1b56c4e9u);
     var y = hash_u32(jitter ^ 0xd2b74407u);
-    if correlated {
+    if grid.correlated {
         x = in_stratum(permute(row, rows, hash_u32(stream ^ 0x51ed270bu)), rows, x);
         y = in_stratum(
             permute(column, columns, hash_u32(stream ^ 0x7d91f2c3u)),
@@ -122,21 +165,6 @@ fn mix_masked(i: u32, key: u32, mask: u32, shift: u32) -> u32 {
     return affine ^ (affine >> shift);
 }
 
-fn sobol_4d(stream: u32, index: u32, set_id: u32) -> vec4<u32> {
-    var point = index;
-    if set_id != 0u {
-        point = reverseBits(owen_scramble(reverseBits(index), hash_u32(stream ^ 0x3c6ef372u)));
-    }
-    var sobol = sobol_reversed(point);
-    if set_id == 0u { sobol = sobol.ywxz; }
-    return vec4<u32>(
-        reverseBits(owen_scramble(sobol.x, hash_u32(stream ^ 0xbb67ae85u))),
-        reverseBits(owen_scramble(sobol.y, hash_u32(stream ^ 0x5be0cd19u))),
-        reverseBits(owen_scramble(sobol.z, hash_u32(stream ^ 0xcbbb9d5du))),
-        reverseBits(owen_scramble(sobol.w, hash_u32(stream ^ 0x629a292au))),
-    );
-}
-
 fn owen_scramble(x: u32, seed: u32) -> u32 {
     var v = x;
     v ^= v * 0x3d20adeau;
@@ -146,112 +174,52 @@ fn owen_scramble(x: u32, seed: u32) -> u32 {
     return v ^ (v * 0x53a22864u);
 }
 
-// Unrolled: a loop of 32 steps counts against the iteration cap of software devices.
-fn sobol_reversed(point: u32) -> vec4<u32> {
-    var pascal = point;
-    pascal ^= (pascal & 0xaaaaaaaau) >> 1u;
-    pascal ^= (pascal & 0xccccccccu) >> 2u;
-    pascal ^= (pascal & 0xf0f0f0f0u) >> 4u;
-    pascal ^= (pascal & 0xff00ff00u) >> 8u;
-    pascal ^= pascal >> 16u;
-    var third = 0u;
-    var fourth = 0u;
-    var m: u32;
-    m = 0u - ((point >> 0u) & 1u);
-    third ^= 0x00000001u & m;
-    fourth ^= 0x00000001u & m;
-    m = 0u - ((point >> 1u) & 1u);
-    third ^= 0x00000003u & m;
-    fourth ^= 0x00000003u & m;
-    m = 0u - ((point >> 2u) & 1u);
-    third ^= 0x00000006u & m;
-    fourth ^= 0x00000004u & m;
-    m = 0u - ((point >> 3u) & 1u);
-    third ^= 0x00000009u & m;
-    fourth ^= 0x0000000au & m;
-    m = 0u - ((point >> 4u) & 1u);
-    third ^= 0x00000017u & m;
-    fourth ^= 0x0000001fu & m;
-    m = 0u - ((point >> 5u) & 1u);
-    third ^= 0x0000003au & m;
-    fourth ^= 0x0000002eu & m;
-    m = 0u - ((point >> 6u) & 1u);
-    third ^= 0x00000071u & m;
-    fourth ^= 0x00000045u & m;
-    m = 0u - ((point >> 7u) & 1u);
-    third ^= 0x000000a3u & m;
-    fourth ^= 0x000000c9u & m;
-    m = 0u - ((point >> 8u) & 1u);
-    third ^= 0x00000116u & m;
-    fourth ^= 0x0000011bu & m;
-    m = 0u - ((point >> 9u) & 1u);
-    third ^= 0x00000339u & m;
-    fourth ^= 0x000002a4u & m;
-    m = 0u - ((point >> 10u) & 1u);
-    third ^= 0x00000677u & m;
-    fourth ^= 0x0000079au & m;
-    m = 0u - ((point >> 11u) & 1u);
-    third ^= 0x000009aau & m;
-    fourth ^= 0x00000b67u & m;
-    m = 0u - ((point >> 12u) & 1u);
-    third ^= 0x00001601u & m;
-    fourth ^= 0x0000101eu & m;
-    m = 0u - ((point >> 13u) & 1u);
-    third ^= 0x00003903u & m;
-    fourth ^= 0x0000302du & m;
-    m = 0u - ((point >> 14u) & 1u);
-    third ^= 0x00007706u & m;
-    fourth ^= 0x00004041u & m;
-    m = 0u - ((point >> 15u) & 1u);
-    third ^= 0x0000aa09u & m;
-    fourth ^= 0x0000a0c3u & m;
-    m = 0u - ((point >> 16u) & 1u);
-    third ^= 0x00010117u & m;
-    fourth ^= 0x0001f104u & m;
-    m = 0u - ((point >> 17u) & 1u);
-    third ^= 0x0003033au & m;
-    fourth ^= 0x0002e28au & m;
-    m = 0u - ((point >> 18u) & 1u);
-    third ^= 0x00060671u & m;
-    fourth ^= 0x000457dfu & m;
-    m = 0u - ((point >> 19u) & 1u);
-    third ^= 0x000909a3u & m;
-    fourth ^= 0x000c9baeu & m;
-    m = 0u - ((point >> 20u) & 1u);
-    third ^= 0x00171616u & m;
-    fourth ^= 0x0011a105u & m;
-    m = 0u - ((point >> 21u) & 1u);
-    third ^= 0x003a3939u & m;
-    fourth ^= 0x002a7289u & m;
-    m = 0u - ((point >> 22u) & 1u);
-    third ^= 0x00717777u & m;
-    fourth ^= 0x0079e7dbu & m;
-    m = 0u - ((point >> 23u) & 1u);
-    third ^= 0x00a3aaaau & m;
-    fourth ^= 0x00b6dba4u & m;
-    m = 0u - ((point >> 24u) & 1u);
-    third ^= 0x01170001u & m;
-    fourth ^= 0x0100011au & m;
-    m = 0u - ((point >> 25u) & 1u);
-    third ^= 0x033a0003u & m;
-    fourth ^= 0x030002a7u & m;
-    m = 0u - ((point >> 26u) & 1u);
-    third ^= 0x06710006u & m;
-    fourth ^= 0x0400079eu & m;
-    m = 0u - ((point >> 27u) & 1u);
-    third ^= 0x09a30009u & m;
-    fourth ^= 0x0a000b6du & m;
-    m = 0u - ((point >> 28u) & 1u);
-    third ^= 0x16160017u & m;
-    fourth ^= 0x1f001001u & m;
-    m = 0u - ((point >> 29u) & 1u);
-    third ^= 0x3939003au & m;
-    fourth ^= 0x2e003003u & m;
-    m = 0u - ((point >> 30u) & 1u);
-    third ^= 0x77770071u & m;
-    fourth ^= 0x45004004u & m;
-    m = 0u - ((point >> 31u) & 1u);
-    third ^= 0xaaaa00a3u & m;
-    fourth ^= 0xc900a00au & m;
-    return vec4<u32>(point, pascal, third, fourth);
+fn sobol_reversed(point: u32, dimension: u32) -> u32 {
+    if dimension == 0u {
+        return point;
+    }
+    if dimension == 1u {
+        var pascal = point;
+        pascal ^= (pascal & 0xaaaaaaaau) >> 1u;
+        pascal ^= (pascal & 0xccccccccu) >> 2u;
+        pascal ^= (pascal & 0xf0f0f0f0u) >> 4u;
+        pascal ^= (pascal & 0xff00ff00u) >> 8u;
+        return pascal ^ (pascal >> 16u);
+    }
+    // Unrolled: a loop of 32 steps counts against the iteration cap of software devices, and constants want constant indices.
+    let second = dimension == 2u;
+    var sum = 0u;
+    sum ^= select(SOBOL_3[0], SOBOL_2[0], second) & (0u - ((point >> 0u) & 1u));
+    sum ^= select(SOBOL_3[1], SOBOL_2[1], second) & (0u - ((point >> 1u) & 1u));
+    sum ^= select(SOBOL_3[2], SOBOL_2[2], second) & (0u - ((point >> 2u) & 1u));
+    sum ^= select(SOBOL_3[3], SOBOL_2[3], second) & (0u - ((point >> 3u) & 1u));
+    sum ^= select(SOBOL_3[4], SOBOL_2[4], second) & (0u - ((point >> 4u) & 1u));
+    sum ^= select(SOBOL_3[5], SOBOL_2[5], second) & (0u - ((point >> 5u) & 1u));
+    sum ^= select(SOBOL_3[6], SOBOL_2[6], second) & (0u - ((point >> 6u) & 1u));
+    sum ^= select(SOBOL_3[7], SOBOL_2[7], second) & (0u - ((point >> 7u) & 1u));
+    sum ^= select(SOBOL_3[8], SOBOL_2[8], second) & (0u - ((point >> 8u) & 1u));
+    sum ^= select(SOBOL_3[9], SOBOL_2[9], second) & (0u - ((point >> 9u) & 1u));
+    sum ^= select(SOBOL_3[10], SOBOL_2[10], second) & (0u - ((point >> 10u) & 1u));
+    sum ^= select(SOBOL_3[11], SOBOL_2[11], second) & (0u - ((point >> 11u) & 1u));
+    sum ^= select(SOBOL_3[12], SOBOL_2[12], second) & (0u - ((point >> 12u) & 1u));
+    sum ^= select(SOBOL_3[13], SOBOL_2[13], second) & (0u - ((point >> 13u) & 1u));
+    sum ^= select(SOBOL_3[14], SOBOL_2[14], second) & (0u - ((point >> 14u) & 1u));
+    sum ^= select(SOBOL_3[15], SOBOL_2[15], second) & (0u - ((point >> 15u) & 1u));
+    sum ^= select(SOBOL_3[16], SOBOL_2[16], second) & (0u - ((point >> 16u) & 1u));
+    sum ^= select(SOBOL_3[17], SOBOL_2[17], second) & (0u - ((point >> 17u) & 1u));
+    sum ^= select(SOBOL_3[18], SOBOL_2[18], second) & (0u - ((point >> 18u) & 1u));
+    sum ^= select(SOBOL_3[19], SOBOL_2[19], second) & (0u - ((point >> 19u) & 1u));
+    sum ^= select(SOBOL_3[20], SOBOL_2[20], second) & (0u - ((point >> 20u) & 1u));
+    sum ^= select(SOBOL_3[21], SOBOL_2[21], second) & (0u - ((point >> 21u) & 1u));
+    sum ^= select(SOBOL_3[22], SOBOL_2[22], second) & (0u - ((point >> 22u) & 1u));
+    sum ^= select(SOBOL_3[23], SOBOL_2[23], second) & (0u - ((point >> 23u) & 1u));
+    sum ^= select(SOBOL_3[24], SOBOL_2[24], second) & (0u - ((point >> 24u) & 1u));
+    sum ^= select(SOBOL_3[25], SOBOL_2[25], second) & (0u - ((point >> 25u) & 1u));
+    sum ^= select(SOBOL_3[26], SOBOL_2[26], second) & (0u - ((point >> 26u) & 1u));
+    sum ^= select(SOBOL_3[27], SOBOL_2[27], second) & (0u - ((point >> 27u) & 1u));
+    sum ^= select(SOBOL_3[28], SOBOL_2[28], second) & (0u - ((point >> 28u) & 1u));
+    sum ^= select(SOBOL_3[29], SOBOL_2[29], second) & (0u - ((point >> 29u) & 1u));
+    sum ^= select(SOBOL_3[30], SOBOL_2[30], second) & (0u - ((point >> 30u) & 1u));
+    sum ^= select(SOBOL_3[31], SOBOL_2[31], second) & (0u - ((point >> 31u) & 1u));
+    return sum;
 }

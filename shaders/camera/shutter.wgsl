@@ -4,7 +4,6 @@ import package::gpu::buffers::frame;
 import package::packed::records::{FRAME_SHUTTER_ORDERED, SHUTTER_POSES};
 import package::camera::sampler::{SampleKey, sample_4d};
 
-const SHUTTER_SET: u32 = 1u;
 
 struct CameraPose {
     position: vec3<f32>,

@@ -2,38 +2,32 @@
 
 import package::gpu::buffers::{frame, pixels};
 import package::camera::sampler::{SampleKey, sample_4d};
-import package::cpu::state::{DELTA_DENSITY, MODE_REAL, MODE_SHARED, PathState};
-
-const SET_DIFFERENCE_LIGHT: u32 = 0u;
-const SET_DIFFERENCE_BSDF: u32 = 1u;
-const SET_DIFFERENCE_CONE: u32 = 2u;
-const SET_PATH_LIGHT: u32 = 3u;
-const SET_PATH_BSDF: u32 = 4u;
-const SETS_PER_DEPTH: u32 = 5u;
-const FIRST_DEPTH_SET: u32 = 2u;
+import package::cpu::state::{
+    DELTA_DENSITY, MODE_REAL, MODE_SHARED, PathState, path_radiances_real, path_results,
+};
 
 fn draw(st: ptr<function, PathState>, purpose: u32) -> vec4<f32> {
-    let v = sample_4d(sample_key(st), FIRST_DEPTH_SET + (*st).depth * SETS_PER_DEPTH + purpose);
+    let v = sample_4d(sample_key(st), FIRST_DEPTH_SET + (*st).ray.depth * SETS_PER_DEPTH + purpose);
     return vec4<f32>(v.z, v.x, v.y, v.w);
 }
 
 fn sample_key(st: ptr<function, PathState>) -> SampleKey {
-    return SampleKey((*st).pixel, (*st).index, frame.rays_total * pixels[(*st).pixel].sample_factor, frame.seed, frame.sampler);
+    return SampleKey((*st).path.pixel, (*st).path.index, frame.rays_total * pixels[(*st).path.pixel].sample_factor, frame.seed, frame.sampler);
 }
 
 fn accumulate(st: ptr<function, PathState>, unclamped: vec3<f32>) {
     var light = unclamped;
-    if (*st).indirect != 0u {
-        let limit = frame.clamp_indirect * (*st).weight;
+    if (*st).path.indirect != 0u {
+        let limit = frame.clamp_indirect * (*st).path.weight;
         let largest = max(max(abs(light.x), abs(light.y)), abs(light.z));
         if largest > limit { light *= limit / largest; }
     }
     @if(paper) {
-        if (*st).mode != MODE_REAL { (*st).radiance += light; }
-        if (*st).mode == MODE_REAL || (*st).mode == MODE_SHARED { (*st).radiance_real += light; }
+        if (*st).path.mode != MODE_REAL { path_results[(*st).lane].radiance += light; }
+        if (*st).path.mode == MODE_REAL || (*st).path.mode == MODE_SHARED { path_radiances_real[(*st).lane] += light; }
     }
     @if(!paper) {
-        (*st).radiance += light;
+        path_results[(*st).lane].radiance += light;
     }
 }
 

@@ -13,17 +13,16 @@ import package::math::{dot3, hash_combine, hash_u32};
 import package::camera::sampler::sample_4d;
 import package::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
 import package::cpu::state::{
-    COINCIDENCE, DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_REAL,
-    PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_REAL,
-    REQUEST_CLOSEST_VIRTUAL, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
-    REQUEST_VIRTUAL_THEN_REAL, STAGE_DIFFERENCE_BSDF, STAGE_DIFFERENCE_CONE, STAGE_DIFFERENCE_SHADOW, STAGE_DONE,
-    STAGE_PAPER_BEHIND, STAGE_PATH, STAGE_PATH_SHADOW, STAGE_PRIMARY_REAL, STAGE_PRIMARY_VIRTUAL, STAGE_REAL_PASS, miss, path_state,
+    COINCIDENCE, DELTA_DENSITY, FAR, FirstHit, Hits, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE,
+    PENDING_NEXT, PENDING_REAL, PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED,
+    REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_VIRTUAL, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
+    REQUEST_VIRTUAL_THEN_REAL, RealPath, STAGE_DIFFERENCE_BSDF, STAGE_DIFFERENCE_CONE, STAGE_DIFFERENCE_SHADOW, STAGE_DONE,
+    STAGE_PAPER_BEHIND, STAGE_PATH, STAGE_PATH_SHADOW, STAGE_PRIMARY_REAL, STAGE_PRIMARY_VIRTUAL, STAGE_REAL_PASS, Segment,
+    path_differences, path_first_hits, path_nexts, path_radiances_real, path_reals, path_results, path_state,
 };
 import package::material::surface::{Surface, surface_at};
 import package::accel::trace::Hit;
 import package::cpu::vertex::shade_vertex;
-
-const TURN_SALT: u32 = 0x7f4a7c15u;
 
 fn difference_turn(pixel: u32, index: u32) -> u32 {
     let period = pixels[pixel].difference_period;
@@ -37,14 +36,14 @@ fn turn_offset(pixel: u32, period: u32) -> u32 {
     return hash_u32(hash_combine(frame.seed ^ TURN_SALT, pixel)) % period;
 }
 
-fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
-    var st = path_state(pixel, index);
+fn begin_sample(lane: u32, pixel: u32, index: u32, is_real_pass: bool) -> PathState {
+    var st = path_state(lane, pixel, index);
     let may_meet_virtual = (pixels[pixel].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u;
     @if(!paper) {
         if !is_real_pass && !may_meet_virtual {
             let turn = difference_turn(pixel, index);
             if turn != NONE {
-                st.index = turn;
+                st.path.index = turn;
             } else if (frame.flags & FRAME_AOVS) == 0u {
                 return st;
             }
@@ -62,22 +61,25 @@ fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
         }
     }
     let ray = camera_ray_from(pose, x, y, u.z, u.w);
-    st.position = ray.origin;
-    st.direction = ray.direction;
+    st.ray.origin.position = ray.origin;
+    st.ray.direction = ray.direction;
+    @if(alpha) {
+        st.ray.opacity_seed = hash_combine(hash_combine(frame.seed, pixel), st.path.index);
+    }
     if is_real_pass {
-        st.stage = STAGE_REAL_PASS;
-        st.request = select(REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_EACH, may_meet_virtual);
+        st.path.stage = STAGE_REAL_PASS;
+        st.ray.request = select(REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_EACH, may_meet_virtual);
         return st;
     }
     @if(paper) {
-        st.mode = MODE_SHARED;
-        st.stage = STAGE_PATH;
-        st.request = REQUEST_CLOSEST_MIXED;
+        st.path.mode = MODE_SHARED;
+        st.path.stage = STAGE_PATH;
+        st.ray.request = REQUEST_CLOSEST_MIXED;
     }
     @if(!paper) {
         if may_meet_virtual {
-            st.stage = STAGE_PRIMARY_VIRTUAL;
-            st.request = REQUEST_CLOSEST_VIRTUAL;
+            st.path.stage = STAGE_PRIMARY_VIRTUAL;
+            st.ray.request = REQUEST_CLOSEST_VIRTUAL;
         }
     }
     return st;
@@ -86,7 +88,7 @@ fn begin_sample(pixel: u32, index: u32, is_real_pass: bool) -> PathState {
 // Consumes the hits in the state and either asks for the next ray or finishes the sample.
 fn advance(st: ptr<function, PathState>) {
     var goes_on = true;
-    switch (*st).stage {
+    switch (*st).path.stage {
         @if(!paper) case STAGE_PRIMARY_VIRTUAL: { goes_on = primary_virtual(st); }
         @if(!paper) case STAGE_PRIMARY_REAL: { primary_real(st); }
         case STAGE_PATH: { goes_on = path_hit(st); }
@@ -101,147 +103,146 @@ fn advance(st: ptr<function, PathState>) {
     if goes_on { resume(st); }
 }
 
-fn virtual_is_nearer(hit_virtual: Hit, hit_real: Hit) -> bool {
-    if hit_virtual.triangle == NONE { return false; }
-    return hit_real.triangle == NONE || hit_virtual.t <= hit_real.t * (1.0 + COINCIDENCE);
+fn virtual_is_nearer(hits: Hits) -> bool {
+    return hits.in_virtual.triangle != NONE
+        && (hits.in_real.triangle == NONE || hits.in_virtual.t <= hits.in_real.t * (1.0 + COINCIDENCE));
 }
 
 fn primary_missed_virtual(st: ptr<function, PathState>, has_turn: bool) {
-    let period = pixels[(*st).pixel].difference_period;
-    (*st).weight = select(0.0, f32(period), has_turn);
-    (*st).throughput = vec3<f32>((*st).weight);
+    let period = pixels[(*st).path.pixel].difference_period;
+    (*st).path.weight = select(0.0, f32(period), has_turn);
+    (*st).path.throughput = vec3<f32>((*st).path.weight);
     if has_turn || (frame.flags & FRAME_AOVS) != 0u {
-        (*st).stage = STAGE_PRIMARY_REAL;
-        (*st).request = REQUEST_CLOSEST_REAL;
-        (*st).hit_virtual = miss();
+        (*st).path.stage = STAGE_PRIMARY_REAL;
+        (*st).ray.request = REQUEST_CLOSEST_REAL;
     } else {
-        (*st).stage = STAGE_DONE;
+        (*st).path.stage = STAGE_DONE;
     }
 }
 
 // False: the state already asks for its next ray, or is done.
 fn primary_virtual(st: ptr<function, PathState>) -> bool {
-    if (*st).hit_virtual.triangle == NONE {
-        primary_missed_virtual(st, difference_turn((*st).pixel, (*st).index) != NONE);
+    if (*st).hits.in_virtual.triangle == NONE {
+        let has_turn = difference_turn((*st).path.pixel, (*st).path.index) != NONE;
+        primary_missed_virtual(st, has_turn);
     } else {
-        (*st).stage = STAGE_PRIMARY_REAL;
-        (*st).request = REQUEST_CLOSEST_REAL;
-        (*st).t_max = (*st).hit_virtual.t;
+        (*st).path.stage = STAGE_PRIMARY_REAL;
+        (*st).ray.request = REQUEST_CLOSEST_REAL;
+        (*st).ray.t_max = (*st).hits.in_virtual.t;
     }
     return false;
 }
 
 fn primary_real(st: ptr<function, PathState>) {
-    (*st).depth = 1u;
-    if virtual_is_nearer((*st).hit_virtual, (*st).hit_real) {
-        (*st).mask = 1u;
-        (*st).mode = MODE_MIXED;
-        plan_vertex(st, (*st).hit_virtual);
-    } else if (*st).hit_real.triangle != NONE {
-        (*st).mode = MODE_DIFFERENCE;
-        plan_vertex(st, (*st).hit_real);
+    (*st).ray.depth = 1u;
+    if virtual_is_nearer((*st).hits) {
+        path_results[(*st).lane].mask = 1u;
+        (*st).path.mode = MODE_MIXED;
+        plan_vertex(st, (*st).hits.in_virtual);
+    } else if (*st).hits.in_real.triangle != NONE {
+        (*st).path.mode = MODE_DIFFERENCE;
+        plan_vertex(st, (*st).hits.in_real);
     }
 }
 
 fn plan_vertex(st: ptr<function, PathState>, hit: Hit) {
-    (*st).pending |= PENDING_VERTEX;
+    (*st).path.pending |= PENDING_VERTEX;
     (*st).vertex_hit = hit;
 }
 
 fn record_first_hit(st: ptr<function, PathState>, s: Surface) {
-    (*st).depth_m = -dot3(s.position - frame.camera_position.xyz, frame.camera_back.xyz);
-    (*st).normal = s.ns;
-    (*st).albedo = bsdf_albedo(s, -(*st).direction);
+    path_first_hits[(*st).lane] = FirstHit(
+        s.ns,
+        -dot3(s.position - frame.camera_position.xyz, frame.camera_back.xyz),
+        bsdf_albedo(s, -(*st).ray.direction),
+        0u,
+    );
 }
 
 fn resume(st: ptr<function, PathState>) {
+    let lane = (*st).lane;
     loop {
-        if ((*st).pending & PENDING_VERTEX) != 0u {
-            (*st).pending &= ~PENDING_VERTEX;
-            let s = surface_at((*st).vertex_hit, (*st).direction);
-            if (frame.flags & FRAME_AOVS) != 0u && (*st).depth == 1u && (*st).depth_m == FAR {
+        if ((*st).path.pending & PENDING_VERTEX) != 0u {
+            (*st).path.pending &= ~PENDING_VERTEX;
+            let s = surface_at((*st).vertex_hit, (*st).ray.direction);
+            if (frame.flags & FRAME_AOVS) != 0u && (*st).ray.depth == 1u && path_first_hits[lane].depth_m == FAR {
                 record_first_hit(st, s);
             }
             shade_vertex(st, s);
             continue;
         }
-        if ((*st).pending & PENDING_SHADOW) != 0u {
-            (*st).pending &= ~PENDING_SHADOW;
-            (*st).request = (*st).shadow_request;
-            (*st).direction = (*st).shadow_direction;
-            (*st).t_max = (*st).shadow_t_max;
-            (*st).stage = select(STAGE_PATH_SHADOW, STAGE_DIFFERENCE_SHADOW, (*st).mode == MODE_DIFFERENCE);
+        if ((*st).path.pending & PENDING_SHADOW) != 0u {
+            (*st).path.pending &= ~PENDING_SHADOW;
+            (*st).path.stage = select(STAGE_PATH_SHADOW, STAGE_DIFFERENCE_SHADOW, (*st).path.mode == MODE_DIFFERENCE);
             return;
         }
-        if ((*st).pending & PENDING_NEXT) != 0u {
-            (*st).pending &= ~PENDING_NEXT;
-            (*st).direction = (*st).next_direction;
-            (*st).density = (*st).next_density;
-            (*st).throughput = (*st).next_throughput;
-            (*st).medium = (*st).next_medium;
-            if (*st).density != DELTA_DENSITY { (*st).indirect = 1u; }
-            (*st).t_max = FAR;
-            if (*st).mode == MODE_DIFFERENCE {
-                (*st).stage = STAGE_DIFFERENCE_CONE;
-                (*st).request = REQUEST_VIRTUAL_THEN_REAL;
+        if ((*st).path.pending & PENDING_NEXT) != 0u {
+            (*st).path.pending &= ~PENDING_NEXT;
+            follow(st, path_nexts[lane]);
+            if (*st).path.mode == MODE_DIFFERENCE {
+                (*st).path.stage = STAGE_DIFFERENCE_CONE;
+                (*st).ray.request = REQUEST_VIRTUAL_THEN_REAL;
             } else {
-                (*st).stage = STAGE_PATH;
-                (*st).request = select(REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_REAL, (*st).mode == MODE_REAL);
+                (*st).path.stage = STAGE_PATH;
+                (*st).ray.request = select(REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_REAL, (*st).path.mode == MODE_REAL);
             }
             return;
         }
-        if ((*st).pending & PENDING_REAL) != 0u {
-            (*st).pending &= ~PENDING_REAL;
-            (*st).mode = MODE_REAL;
-            (*st).medium = (*st).real_medium;
-            (*st).depth = (*st).real_depth;
-            (*st).direction = (*st).real_direction;
-            (*st).density = (*st).real_density;
-            (*st).throughput = (*st).real_throughput;
-            if (*st).density != DELTA_DENSITY { (*st).indirect = 1u; }
-            plan_vertex(st, (*st).real_hit);
+        if ((*st).path.pending & PENDING_REAL) != 0u {
+            (*st).path.pending &= ~PENDING_REAL;
+            let real = path_reals[lane];
+            (*st).path.mode = MODE_REAL;
+            follow(st, real.segment);
+            (*st).ray.depth = (*st).path.real_depth;
+            plan_vertex(st, real.hit);
             continue;
         }
         @if(!paper) {
-            if ((*st).pending & PENDING_DIFFERENCE) != 0u {
-                (*st).pending &= ~PENDING_DIFFERENCE;
-                (*st).mode = MODE_DIFFERENCE;
-                (*st).medium = (*st).difference_medium;
-                (*st).position = (*st).difference_position;
-                (*st).offset = (*st).difference_offset;
-                (*st).coincidence_ratio = (*st).difference_coincidence_ratio;
-                (*st).side = 0u;
-                (*st).real_t_min = (*st).difference_t_min;
-                (*st).direction = (*st).difference_direction;
-                (*st).density = (*st).difference_density;
-                (*st).throughput = (*st).difference_throughput;
-                (*st).indirect = 1u;
-                (*st).depth = (*st).difference_depth;
-                (*st).t_max = FAR;
-                (*st).stage = STAGE_DIFFERENCE_BSDF;
-                (*st).request = select(REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, (*st).difference_left_to_cones != 0u);
+            if ((*st).path.pending & PENDING_DIFFERENCE) != 0u {
+                (*st).path.pending &= ~PENDING_DIFFERENCE;
+                (*st).path.mode = MODE_DIFFERENCE;
+                follow(st, path_differences[lane].segment);
+                (*st).path.indirect = 1u;
+                (*st).ray.origin = path_differences[lane].origin;
+                (*st).ray.side = 0u;
+                (*st).ray.depth = path_differences[lane].depth;
+                (*st).path.stage = STAGE_DIFFERENCE_BSDF;
+                (*st).ray.request = path_differences[lane].request;
                 return;
             }
         }
-        (*st).stage = STAGE_DONE;
+        (*st).path.stage = STAGE_DONE;
         return;
     }
 }
 
+fn follow(st: ptr<function, PathState>, segment: Segment) {
+    (*st).ray.direction = segment.direction;
+    (*st).ray.t_max = FAR;
+    (*st).path.density = segment.density;
+    (*st).path.throughput = segment.throughput;
+    (*st).path.medium = segment.medium;
+    if segment.density != DELTA_DENSITY { (*st).path.indirect = 1u; }
+}
+
+fn followed(st: ptr<function, PathState>) -> Segment {
+    return Segment((*st).ray.direction, (*st).path.density, (*st).path.throughput, (*st).path.medium);
+}
+
 fn path_hit(st: ptr<function, PathState>) -> bool {
-    let virtual_first = (*st).mode != MODE_REAL && virtual_is_nearer((*st).hit_virtual, (*st).hit_real);
-    var hit = (*st).hit_real;
-    if virtual_first { hit = (*st).hit_virtual; }
-    (*st).depth += 1u;
+    let virtual_first = (*st).path.mode != MODE_REAL && virtual_is_nearer((*st).hits);
+    var hit = (*st).hits.in_real;
+    if virtual_first { hit = (*st).hits.in_virtual; }
+    (*st).ray.depth += 1u;
     if hit.triangle == NONE {
         path_escape(st);
         return true;
     }
     @if(paper) {
-        if (*st).mode == MODE_SHARED && virtual_first {
-            if (*st).depth == 1u { (*st).mask = 1u; }
-            (*st).stage = STAGE_PAPER_BEHIND;
-            (*st).request = REQUEST_CLOSEST_REAL;
+        if (*st).path.mode == MODE_SHARED && virtual_first {
+            if (*st).ray.depth == 1u { path_results[(*st).lane].mask = 1u; }
+            (*st).path.stage = STAGE_PAPER_BEHIND;
+            (*st).ray.request = REQUEST_CLOSEST_REAL;
             return false;
         }
     }
@@ -250,110 +251,107 @@ fn path_hit(st: ptr<function, PathState>) -> bool {
 }
 
 fn paper_behind(st: ptr<function, PathState>) {
-    if (*st).hit_real.triangle != NONE {
-        (*st).pending |= PENDING_REAL;
-        (*st).real_hit = (*st).hit_real;
-        (*st).real_direction = (*st).direction;
-        (*st).real_density = (*st).density;
-        (*st).real_throughput = (*st).throughput;
-        (*st).real_medium = (*st).medium;
-        (*st).real_depth = (*st).depth;
+    if (*st).hits.in_real.triangle != NONE {
+        (*st).path.pending |= PENDING_REAL;
+        path_reals[(*st).lane] = RealPath(followed(st), (*st).hits.in_real);
+        (*st).path.real_depth = (*st).ray.depth;
     } else {
-        (*st).mode = MODE_REAL;
+        (*st).path.mode = MODE_REAL;
         path_escape(st);
     }
-    (*st).mode = MODE_MIXED;
-    plan_vertex(st, (*st).hit_virtual);
+    (*st).path.mode = MODE_MIXED;
+    plan_vertex(st, (*st).hits.in_virtual);
 }
 
 fn path_escape(st: ptr<function, PathState>) {
-    if (*st).depth == 1u && (frame.flags & FRAME_ENV_DRAWN) == 0u { return; }
+    if (*st).ray.depth == 1u && (frame.flags & FRAME_ENV_DRAWN) == 0u { return; }
     accumulate(st, escaping_light(st));
 }
 
 fn escaping_light(st: ptr<function, PathState>) -> vec3<f32> {
-    if (*st).density == DELTA_DENSITY { return (*st).throughput * env_radiance((*st).direction); }
-    let arriving = env_arriving((*st).direction);
-    return (*st).throughput * arriving.radiance * density_weight((*st).density, arriving.pdf);
+    if (*st).path.density == DELTA_DENSITY { return (*st).path.throughput * env_radiance((*st).ray.direction); }
+    let arriving = env_arriving((*st).ray.direction);
+    return (*st).path.throughput * arriving.radiance * density_weight((*st).path.density, arriving.pdf);
 }
 
 fn path_shadow(st: ptr<function, PathState>) {
-    let open_virtual = (*st).hit_virtual.triangle == NONE;
-    let open_real = (*st).hit_real.triangle == NONE;
+    let open_virtual = (*st).hits.in_virtual.triangle == NONE;
+    let open_real = (*st).hits.in_real.triangle == NONE;
+    let light = (*st).path.shadow_contribution;
     @if(paper) {
-        if (*st).mode == MODE_SHARED {
-            if (*st).shadow_request == REQUEST_SHADOW_PAIR {
-                if open_virtual { (*st).radiance += (*st).shadow_contribution; }
-                if open_real { (*st).radiance_real += (*st).shadow_contribution; }
+        if (*st).path.mode == MODE_SHARED {
+            if (*st).ray.request == REQUEST_SHADOW_PAIR {
+                if open_virtual { path_results[(*st).lane].radiance += light; }
+                if open_real { path_radiances_real[(*st).lane] += light; }
             } else if open_virtual && open_real {
-                (*st).radiance += (*st).shadow_contribution;
+                path_results[(*st).lane].radiance += light;
             }
             return;
         }
     }
-    if open_virtual && open_real { accumulate(st, (*st).shadow_contribution); }
+    if open_virtual && open_real { accumulate(st, light); }
 }
 
 fn difference_shadow(st: ptr<function, PathState>) {
-    let open_real = (*st).hit_real.triangle == NONE;
-    let open_virtual = (*st).hit_virtual.triangle == NONE;
-    let blocked_alone = (*st).shadow_request == REQUEST_SHADOW_DIFFERENCE;
-    if open_real && open_virtual != blocked_alone { (*st).radiance += (*st).shadow_contribution; }
+    let open_real = (*st).hits.in_real.triangle == NONE;
+    let open_virtual = (*st).hits.in_virtual.triangle == NONE;
+    let blocked_alone = (*st).ray.request == REQUEST_SHADOW_DIFFERENCE;
+    if open_real && open_virtual != blocked_alone { path_results[(*st).lane].radiance += (*st).path.shadow_contribution; }
 }
 
 fn difference_cone(st: ptr<function, PathState>) {
-    if virtual_is_nearer((*st).hit_virtual, (*st).hit_real) { split_difference(st); }
+    if virtual_is_nearer((*st).hits) { split_difference(st); }
 }
 
 fn difference_bsdf(st: ptr<function, PathState>) {
-    if virtual_is_nearer((*st).hit_virtual, (*st).hit_real) {
-        if (*st).difference_left_to_cones == 0u {
-            if (*st).density != DELTA_DENSITY {
-                let total = (*st).density + vertex_cone_density(st);
-                (*st).throughput *= (*st).density / total;
-                (*st).density = total;
+    if virtual_is_nearer((*st).hits) {
+        let left_to_cones = (*st).ray.request == REQUEST_REAL_UNLESS_COVERED;
+        if !left_to_cones {
+            if (*st).path.density != DELTA_DENSITY {
+                let total = (*st).path.density + vertex_cone_density(st);
+                (*st).path.throughput *= (*st).path.density / total;
+                (*st).path.density = total;
             }
             split_difference(st);
         }
         return;
     }
     @if(multi_bounce) {
-        if (*st).hit_real.triangle != NONE && (*st).depth < frame.max_bounces {
-            (*st).depth += 1u;
-            plan_vertex(st, (*st).hit_real);
+        if (*st).hits.in_real.triangle != NONE && (*st).ray.depth < frame.max_bounces {
+            (*st).ray.depth += 1u;
+            plan_vertex(st, (*st).hits.in_real);
         }
     }
 }
 
 fn vertex_cone_density(st: ptr<function, PathState>) -> f32 {
-    if (*st).difference_cone_probability == 0.0 { return 0.0; }
-    return (*st).difference_cone_probability * cone_pdf((*st).position, (*st).difference_normal, (*st).direction);
+    let probability = path_differences[(*st).lane].cone_probability;
+    if probability == 0.0 { return 0.0; }
+    return probability * cone_pdf((*st).ray.origin.position, path_differences[(*st).lane].normal, (*st).ray.direction);
 }
 
 fn split_difference(st: ptr<function, PathState>) {
-    if (*st).hit_real.triangle == NONE {
-        (*st).radiance -= escaping_light(st);
+    if (*st).hits.in_real.triangle == NONE {
+        path_results[(*st).lane].radiance -= escaping_light(st);
     } else {
-        (*st).pending |= PENDING_REAL;
-        (*st).real_hit = (*st).hit_real;
-        (*st).real_direction = (*st).direction;
-        (*st).real_density = (*st).density;
-        (*st).real_throughput = -(*st).throughput;
-        (*st).real_medium = (*st).medium;
-        (*st).real_depth = (*st).depth + 1u;
+        (*st).path.pending |= PENDING_REAL;
+        var segment = followed(st);
+        segment.throughput = -segment.throughput;
+        path_reals[(*st).lane] = RealPath(segment, (*st).hits.in_real);
+        (*st).path.real_depth = (*st).ray.depth + 1u;
     }
-    (*st).mode = MODE_MIXED;
-    (*st).depth += 1u;
-    plan_vertex(st, (*st).hit_virtual);
+    (*st).path.mode = MODE_MIXED;
+    (*st).ray.depth += 1u;
+    plan_vertex(st, (*st).hits.in_virtual);
 }
 
 fn real_pass(st: ptr<function, PathState>) {
-    if virtual_is_nearer((*st).hit_virtual, (*st).hit_real) { (*st).mask = 1u; }
-    (*st).mode = MODE_REAL;
-    (*st).depth = 1u;
-    if (*st).hit_real.triangle == NONE {
+    if virtual_is_nearer((*st).hits) { path_results[(*st).lane].mask = 1u; }
+    (*st).path.mode = MODE_REAL;
+    (*st).ray.depth = 1u;
+    if (*st).hits.in_real.triangle == NONE {
         path_escape(st);
     } else {
-        plan_vertex(st, (*st).hit_real);
+        plan_vertex(st, (*st).hits.in_real);
     }
 }

@@ -5,25 +5,19 @@ import package::packed::records::{FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_MASK, MATER
 import package::shared::NONE;
 import package::math::{dot3, hash_combine, length3, uniform_from_bits};
 import package::cpu::state::{
-    COINCIDENCE, FAR, PathState, miss,
+    COINCIDENCE, FAR, Hits, MISS, PathRay, PathState,
     REQUEST_CLOSEST_VIRTUAL, REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_EACH, REQUEST_VIRTUAL_THEN_REAL,
     REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_MIXED, REQUEST_SHADOW_REAL, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
 };
 import package::accel::trace::{Hit, Ray, trace};
 @if(alpha) import package::material::surface::surface_alpha;
 
-const MAX_ALPHA_LAYERS: u32 = 64u;
-const WORLD_REAL: u32 = 0u;
-const WORLD_VIRTUAL: u32 = 1u;
-const QUERY_NONE: u32 = 2u;
-const MIN_POSITIVE: f32 = 1.1754944e-38;
-
 // One query of a request: a world (QUERY_NONE: the request is answered) and how far.
 struct Query {
     world: u32,
     any_hit: bool,
     t_max: f32,
-    // The answer goes to hit_real rather than hit_virtual.
+    // The answer goes to the real world's hit rather than the virtual one's.
     to_real: bool,
 }
 
@@ -31,11 +25,10 @@ fn query(world: u32, any_hit: bool, t_max: f32) -> Query {
     return Query(world, any_hit, t_max, world == WORLD_REAL);
 }
 
-// The request as a sequence of at most three queries, so that a kernel has one trace call site.
-fn next_query(request: u32, step: u32, t_max: f32, hit_real: Hit, hit_virtual: Hit) -> Query {
-    let none = Query(QUERY_NONE, false, 0.0, false);
-    let met_real = hit_real.triangle != NONE;
-    let met_virtual = hit_virtual.triangle != NONE;
+// The request as a sequence of at most three queries, so that a kernel has one trace call site; `hits`: what the earlier ones met.
+fn next_query(request: u32, step: u32, t_max: f32, hits: Hits) -> Query {
+    let met_real = hits.in_real.triangle != NONE;
+    let met_virtual = hits.in_virtual.triangle != NONE;
     switch request {
         case REQUEST_CLOSEST_VIRTUAL: {
             if step == 0u { return query(WORLD_VIRTUAL, false, t_max); }
@@ -45,7 +38,7 @@ fn next_query(request: u32, step: u32, t_max: f32, hit_real: Hit, hit_virtual: H
         }
         case REQUEST_CLOSEST_MIXED: {
             if step == 0u { return query(WORLD_VIRTUAL, false, t_max); }
-            if step == 1u { return query(WORLD_REAL, false, hit_virtual.t); }
+            if step == 1u { return query(WORLD_REAL, false, hits.in_virtual.t); }
         }
         case REQUEST_CLOSEST_EACH: {
             if step == 0u { return query(WORLD_VIRTUAL, false, t_max); }
@@ -57,7 +50,7 @@ fn next_query(request: u32, step: u32, t_max: f32, hit_real: Hit, hit_virtual: H
         }
         case REQUEST_REAL_UNLESS_COVERED: {
             if step == 0u { return query(WORLD_REAL, false, t_max); }
-            if step == 1u && met_real { return query(WORLD_VIRTUAL, true, hit_real.t * (1.0 + COINCIDENCE)); }
+            if step == 1u && met_real { return query(WORLD_VIRTUAL, true, hits.in_real.t * (1.0 + COINCIDENCE)); }
         }
         case REQUEST_SHADOW_MIXED: {
             if step == 0u { return query(WORLD_VIRTUAL, true, t_max); }
@@ -77,15 +70,17 @@ fn next_query(request: u32, step: u32, t_max: f32, hit_real: Hit, hit_virtual: H
         }
         default: {}
     }
-    return none;
+    return query(QUERY_NONE, false, 0.0);
 }
 
 fn asks_both() -> bool {
     return (frame.flags & FRAME_BOTH_SHADOWS) != 0u;
 }
 
-fn count_rays(st: ptr<function, PathState>, met_real: bool, met_virtual: bool) {
-    switch (*st).request {
+fn count_rays(st: ptr<function, PathState>) {
+    let met_real = (*st).hits.in_real.triangle != NONE;
+    let met_virtual = (*st).hits.in_virtual.triangle != NONE;
+    switch (*st).ray.request {
         case REQUEST_CLOSEST_VIRTUAL, REQUEST_CLOSEST_MIXED, REQUEST_CLOSEST_EACH: { (*st).rays.mixed += 1u; }
         case REQUEST_CLOSEST_REAL: { (*st).rays.real += 1u; }
         case REQUEST_VIRTUAL_THEN_REAL: {
@@ -110,20 +105,19 @@ fn count_rays(st: ptr<function, PathState>, met_real: bool, met_virtual: bool) {
     }
 }
 
-// Traces what the state asks for and leaves the answer in hit_real and hit_virtual. `thread`: local invocation index.
+// Traces what the state asks for and leaves the answer in its hits. `thread`: local invocation index.
 fn answer(st: ptr<function, PathState>, thread: u32) {
-    let request = (*st).request;
-    var hit_real = miss();
-    var hit_virtual = miss();
+    let request = (*st).ray.request;
+    var hits = Hits(MISS, MISS);
     var step = 0u;
     var layer = 0u;
     var t_min = -1.0;
     var skip = NONE;
     // Transparent layers repeat a query from where it stopped.
     loop {
-        let q = next_query(request, step, (*st).t_max, hit_real, hit_virtual);
+        let q = next_query(request, step, (*st).ray.t_max, hits);
         if q.world == QUERY_NONE { break; }
-        var ray = ray_into(st, q.world, q.t_max);
+        var ray = ray_into((*st).ray, q.world, q.t_max);
         var any_hit = q.any_hit;
         @if(alpha) {
             any_hit = false;
@@ -132,9 +126,9 @@ fn answer(st: ptr<function, PathState>, thread: u32) {
                 ray.skip = skip;
             }
         }
-        let hit = trace(ray, q.world, any_hit, thread);
+        var hit = trace(ray, q.world, any_hit, thread);
         @if(alpha) {
-            if hit.triangle != NONE && layer + 1u < MAX_ALPHA_LAYERS && !meets(st, hit) {
+            if hit.triangle != NONE && layer + 1u < MAX_ALPHA_LAYERS && !meets((*st).ray, hit) {
                 t_min = hit.t;
                 skip = hit.triangle;
                 layer += 1u;
@@ -142,40 +136,39 @@ fn answer(st: ptr<function, PathState>, thread: u32) {
             }
             layer = 0u;
         }
-        if q.to_real { hit_real = hit; } else { hit_virtual = hit; }
         if q.any_hit && hit.triangle != NONE {
             // Only that something was met means anything.
-            if q.to_real { hit_real.t = 0.0; } else { hit_virtual.t = 0.0; }
+            hit.t = 0.0;
         }
+        if q.to_real { hits.in_real = hit; } else { hits.in_virtual = hit; }
         step += 1u;
     }
-    count_rays(st, hit_real.triangle != NONE, hit_virtual.triangle != NONE);
     if request == REQUEST_CLOSEST_REAL {
-        // The primary real ray answers beside the virtual hit found before.
-        hit_virtual = (*st).hit_virtual;
+        // It answers beside the virtual hit found before.
+        hits.in_virtual = (*st).hits.in_virtual;
     }
-    (*st).hit_real = hit_real;
-    (*st).hit_virtual = hit_virtual;
+    (*st).hits = hits;
+    count_rays(st);
 }
 
 // Where a ray starts in its own world and in the other one: see src/cpu/request.rs.
-fn ray_into(st: ptr<function, PathState>, world: u32, t_max: f32) -> Ray {
-    let offset = (*st).offset;
-    var shift = -offset * (*st).coincidence_ratio;
-    if world == (*st).side {
-        shift = select(offset, -offset, dot3((*st).direction, offset) < 0.0);
+fn ray_into(ray: PathRay, world: u32, t_max: f32) -> Ray {
+    let offset = ray.origin.offset;
+    var shift = -offset * ray.origin.coincidence_ratio;
+    if world == ray.side {
+        shift = select(offset, -offset, dot3(ray.direction, offset) < 0.0);
     } else if world == WORLD_REAL {
-        shift = offset * (*st).coincidence_ratio;
+        shift = offset * ray.origin.coincidence_ratio;
     }
-    var direction = (*st).direction;
+    var direction = ray.direction;
     var distance = t_max;
-    if is_shadow((*st).request) && t_max < FAR {
+    if is_shadow(ray.request) && t_max < FAR {
         let to_end = direction * t_max - shift;
         distance = length3(to_end);
         direction = to_end / max(distance, MIN_POSITIVE);
     }
-    let t_min = select(0.0, (*st).real_t_min, world == WORLD_REAL);
-    return Ray((*st).position + shift, t_min, direction, distance, NONE);
+    let t_min = select(0.0, ray.origin.real_t_min, world == WORLD_REAL);
+    return Ray(ray.origin.position + shift, t_min, direction, distance, NONE);
 }
 
 fn is_shadow(request: u32) -> bool {
@@ -184,10 +177,10 @@ fn is_shadow(request: u32) -> bool {
 }
 
 @if(alpha)
-fn meets(st: ptr<function, PathState>, hit: Hit) -> bool {
+fn meets(ray: PathRay, hit: Hit) -> bool {
     let flags = materials[triangles[hit.triangle].material].flags;
     if (flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND)) == 0u { return true; }
     let alpha = surface_alpha(hit);
-    let bits = hash_combine(hash_combine(hash_combine(hash_combine(frame.seed, (*st).pixel), (*st).index), hit.triangle), (*st).depth);
+    let bits = hash_combine(hash_combine(ray.opacity_seed, hit.triangle), ray.depth);
     return uniform_from_bits(bits) < alpha;
 }

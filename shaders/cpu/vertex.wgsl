@@ -15,25 +15,16 @@ import package::cpu::contribution::{
 import package::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 import package::math::{dot3, exp_, safe_sqrt};
 import package::cpu::state::{
-    COINCIDENCE, DELTA_DENSITY, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT, PENDING_SHADOW, PathState,
-    REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED, REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL,
+    COINCIDENCE, DELTA_DENSITY, DifferenceRay, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
+    PENDING_SHADOW, PathState, REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED,
+    REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL, RayOrigin, Segment, path_differences, path_nexts,
 };
 import package::material::surface::Surface;
 
-const ROULETTE_FROM_DEPTH: u32 = 2u;
-const ROULETTE_GAIN: f32 = 4.0;
-const CONE_ROULETTE_GAIN: f32 = 8.0;
-const CONE_ROULETTE_FLOOR: f32 = 0.1;
-const RECURSION_ROULETTE_GAIN: f32 = 1.0;
-const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
-const SHADOW_SHORTEN: f32 = 2e-5;
-const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
-
-const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
-
-struct Roulette {
-    cone: f32,
-    bsdf: f32,
+// The cones are seen anew for each question: there is arithmetic to spare, but no memory.
+struct Techniques {
+    cone_probability: f32,
+    bsdf_probability: f32,
 }
 
 fn max_element(v: vec3<f32>) -> f32 {
@@ -46,54 +37,48 @@ fn is_difference(st: ptr<function, PathState>) -> bool {
         return false;
     }
     @else {
-        return (*st).mode == MODE_DIFFERENCE;
+        return (*st).path.mode == MODE_DIFFERENCE;
     }
 }
 
 fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     let difference = is_difference(st);
-    let wo = -(*st).direction;
+    let wo = -(*st).ray.direction;
     let distance = (*st).vertex_hit.t;
     @if(transmission) {
-        if (*st).medium != NONE {
-            let sigma = materials[(*st).medium].sigma_a;
-            (*st).throughput *= vec3<f32>(exp_(-sigma.x * distance), exp_(-sigma.y * distance), exp_(-sigma.z * distance));
+        if (*st).path.medium != NONE {
+            let sigma = materials[(*st).path.medium].sigma_a;
+            (*st).path.throughput *= vec3<f32>(exp_(-sigma.x * distance), exp_(-sigma.y * distance), exp_(-sigma.z * distance));
         }
     }
     if !difference {
         add_emission(st, s, distance);
     }
-    if (*st).depth > frame.max_bounces || (s.flags & EMITS_ONLY) != 0u || all((*st).throughput == vec3<f32>(0.0)) {
+    if (*st).ray.depth > frame.max_bounces || (s.flags & EMITS_ONLY) != 0u || all((*st).path.throughput == vec3<f32>(0.0)) {
         return;
     }
     let side = select(0u, 1u, (*st).vertex_hit.triangle >= frame.real_triangle_count);
-    let leaves_coinciding_real = side == 1u && (*st).side == 0u && coincides(st, s, distance);
+    let leaves_coinciding_real = side == 1u && (*st).ray.side == 0u && coincides(st, s, distance);
     let reach = 1.0 + COINCIDENCE * distance / s.error;
-    (*st).coincidence_ratio = select(reach, -reach, leaves_coinciding_real);
-    (*st).position = s.position;
-    (*st).offset = s.ng * s.error;
-    (*st).side = side;
-    (*st).real_t_min = materials[s.material].self_shadow_bias;
+    (*st).ray.origin = RayOrigin(
+        s.position,
+        materials[s.material].self_shadow_bias,
+        s.ng * s.error,
+        select(reach, -reach, leaves_coinciding_real),
+    );
+    (*st).ray.side = side;
 
-    var roulette = Roulette(1.0, 1.0);
+    // Those of a path are played for certain.
+    var techniques = Techniques(0.0, 1.0);
     @if(!paper) {
-        if difference && (frame.flags & FRAME_NO_CONES) != 0u {
-            roulette.cone = 0.0;
-        } else if difference {
-            let strength = max_element(abs((*st).throughput * bsdf_albedo(s, wo)));
-            let reach = cone_solid_angle_fraction(s.position, s.ns);
-            roulette.cone = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
-            if bsdf_is_lambertian(s) {
-                roulette.bsdf = clamp(RECURSION_ROULETTE_GAIN * strength, RECURSION_ROULETTE_FLOOR, 1.0);
-            }
-        }
+        if difference { techniques = techniques_at(st, s, wo); }
     }
-    next_event(st, s, wo, roulette);
+    next_event(st, s, wo, techniques);
     if lights_suffice(st, s) { return; }
     @if(!paper) {
-        if difference { plan_cone(st, s, wo, roulette); }
+        if difference { plan_cone(st, s, wo, techniques); }
     }
-    plan_continuation(st, s, wo, roulette);
+    plan_continuation(st, s, wo, techniques);
 }
 
 fn lights_suffice(st: ptr<function, PathState>, s: Surface) -> bool {
@@ -101,7 +86,7 @@ fn lights_suffice(st: ptr<function, PathState>, s: Surface) -> bool {
         return false;
     }
     @else {
-        return (*st).depth >= frame.max_bounces
+        return (*st).ray.depth >= frame.max_bounces
             && (frame.flags & (FRAME_LIGHTS_SUFFICE | FRAME_NO_LAST_VERTEX)) == FRAME_LIGHTS_SUFFICE
             && bsdf_is_lambertian(s);
     }
@@ -111,43 +96,58 @@ fn left_to_cones(s: Surface) -> bool {
     return bsdf_is_lambertian(s) && (frame.flags & FRAME_NO_CONES) == 0u;
 }
 
+fn techniques_at(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>) -> Techniques {
+    if (frame.flags & FRAME_NO_CONES) != 0u { return Techniques(0.0, 1.0); }
+    let strength = max_element(abs((*st).path.throughput * bsdf_albedo(s, wo)));
+    let reach = cone_solid_angle_fraction(s.position, s.ns);
+    let cone_probability = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
+    var bsdf_probability = 1.0;
+    if bsdf_is_lambertian(s) {
+        bsdf_probability = clamp(RECURSION_ROULETTE_GAIN * strength, RECURSION_ROULETTE_FLOOR, 1.0);
+    }
+    return Techniques(cone_probability, bsdf_probability);
+}
+
 fn coincides(st: ptr<function, PathState>, s: Surface, distance: f32) -> bool {
-    let error2 = dot3((*st).offset, (*st).offset);
-    let errors = 2.0 * (error2 * (1.0 + (*st).coincidence_ratio) + safe_sqrt(error2) * s.error);
-    return abs(dot3((*st).direction, (*st).offset)) * distance <= errors;
+    let offset = (*st).ray.origin.offset;
+    let error2 = dot3(offset, offset);
+    let ratio = (*st).ray.origin.coincidence_ratio;
+    let errors = 2.0 * (error2 * (1.0 + ratio) + safe_sqrt(error2) * s.error);
+    return abs(dot3((*st).ray.direction, offset)) * distance <= errors;
 }
 
 fn add_emission(st: ptr<function, PathState>, s: Surface, distance: f32) {
     if max_element(s.emission) <= 0.0 { return; }
     var weight = 1.0;
     @if(area_lights) {
-        if s.light != NONE && (*st).density != DELTA_DENSITY {
-            let from_position = s.position - (*st).direction * distance;
-            weight = density_weight((*st).density, light_pdf_hit(s.light, from_position, (*st).direction, distance));
+        if s.light != NONE && (*st).path.density != DELTA_DENSITY {
+            let direction = (*st).ray.direction;
+            let from_position = s.position - direction * distance;
+            let pdf = light_pdf_hit(s.light, from_position, direction, distance);
+            weight = density_weight((*st).path.density, pdf);
         }
     }
-    accumulate(st, (*st).throughput * s.emission * weight);
+    accumulate(st, (*st).path.throughput * s.emission * weight);
 }
 
-fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
+fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques) {
     if frame.light_count == 0u || bsdf_is_delta(s) { return; }
     let difference = is_difference(st);
     let set_id = select(SET_PATH_LIGHT, SET_DIFFERENCE_LIGHT, difference);
     let u = draw(st, set_id);
     let l = light_sample(light_select(u.x, u.w), s.position, u.yz);
-    let contribution = light_contribution(st, s, wo, roulette, l);
+    let contribution = light_contribution(st, s, wo, techniques, l);
     if any(contribution != vec3<f32>(0.0)) {
-        (*st).shadow_contribution = contribution;
-        plan_shadow(st, s, l);
+        plan_shadow(st, s, l, contribution);
     }
 }
 
 fn light_contribution(
-    st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette, l: LightSample,
+    st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques, l: LightSample,
 ) -> vec3<f32> {
     let difference = is_difference(st);
     let real_light = l.side == 0u;
-    if l.pdf <= 0.0 || ((*st).mode == MODE_REAL && !real_light) { return vec3<f32>(0.0); }
+    if l.pdf <= 0.0 || ((*st).path.mode == MODE_REAL && !real_light) { return vec3<f32>(0.0); }
     @if(!paper) {
         let asks_both = (frame.flags & FRAME_BOTH_SHADOWS) != 0u;
         if difference && real_light && !asks_both && !direction_meets_spheres(s.position, l.direction) { return vec3<f32>(0.0); }
@@ -160,47 +160,54 @@ fn light_contribution(
         @if(!paper) {
             if difference {
                 other = 0.0;
-                if roulette.cone > 0.0 { other = roulette.cone * cone_pdf(s.position, s.ns, l.direction); }
+                if techniques.cone_probability > 0.0 { other = techniques.cone_probability * cone_pdf(s.position, s.ns, l.direction); }
                 if !left_to_cones(s) { other += f.pdf; }
             }
         }
         weight = density_weight(l.pdf, other);
     }
     let sign = select(1.0, -1.0, difference && real_light);
-    return (*st).throughput * f.f_cos * l.radiance * (sign * weight / l.pdf);
+    return (*st).path.throughput * f.f_cos * l.radiance * (sign * weight / l.pdf);
 }
 
-fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample) {
-    (*st).shadow_direction = l.direction;
-    (*st).shadow_t_max = FAR;
+fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample, contribution: vec3<f32>) {
+    (*st).path.shadow_contribution = contribution;
+    (*st).ray.direction = l.direction;
+    (*st).ray.t_max = FAR;
     if l.distance < FAR {
-        (*st).shadow_t_max = l.distance - SHADOW_SHORTEN * l.distance - SHADOW_SHORTEN_ERRORS * s.error;
+        (*st).ray.t_max = l.distance - SHADOW_SHORTEN * l.distance - SHADOW_SHORTEN_ERRORS * s.error;
     }
     let real_light = l.side == 0u;
     var request = REQUEST_SHADOW_MIXED;
     if is_difference(st) && real_light { request = REQUEST_SHADOW_DIFFERENCE; }
-    if (*st).mode == MODE_REAL { request = REQUEST_SHADOW_REAL; }
+    if (*st).path.mode == MODE_REAL { request = REQUEST_SHADOW_REAL; }
     @if(paper) {
-        if (*st).mode == MODE_SHARED && real_light { request = REQUEST_SHADOW_PAIR; }
+        if (*st).path.mode == MODE_SHARED && real_light { request = REQUEST_SHADOW_PAIR; }
     }
-    (*st).shadow_request = request;
-    (*st).pending |= PENDING_SHADOW;
+    (*st).ray.request = request;
+    (*st).path.pending |= PENDING_SHADOW;
 }
 
-fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
+fn plays(u: vec4<f32>, probability: f32) -> bool {
+    return probability >= 1.0 || u.w < probability;
+}
+
+fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques) {
     let u = draw(st, SET_DIFFERENCE_CONE);
-    if frame.sphere_count == 0u || u.w >= roulette.cone { return; }
+    if frame.sphere_count == 0u || !plays(u, techniques.cone_probability) { return; }
     let c = cone_sample(s.position, s.ns, u.x, u.yz);
     if c.pdf <= 0.0 { return; }
     let f = bsdf_eval(s, wo, c.direction);
     if max_element(f.f_cos) <= 0.0 { return; }
-    var density = roulette.cone * c.pdf;
+    var density = techniques.cone_probability * c.pdf;
     if !bsdf_is_lambertian(s) { density += f.pdf; }
-    (*st).pending |= PENDING_NEXT;
-    (*st).next_direction = c.direction;
-    (*st).next_throughput = (*st).throughput * f.f_cos * (1.0 / density);
-    (*st).next_density = density;
-    (*st).next_medium = medium_along(st, s, c.direction);
+    (*st).path.pending |= PENDING_NEXT;
+    path_nexts[(*st).lane] = Segment(
+        c.direction,
+        density,
+        (*st).path.throughput * f.f_cos * (1.0 / density),
+        medium_along(st, s, c.direction),
+    );
 }
 
 fn medium_along(st: ptr<function, PathState>, s: Surface, direction: vec3<f32>) -> u32 {
@@ -209,46 +216,46 @@ fn medium_along(st: ptr<function, PathState>, s: Surface, direction: vec3<f32>) 
             return select(NONE, s.material, s.front);
         }
     }
-    return (*st).medium;
+    return (*st).path.medium;
 }
 
-fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, roulette: Roulette) {
+fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques) {
     let difference = is_difference(st);
-    if difference && left_to_cones(s) && (*st).depth >= frame.max_bounces { return; }
+    let leaves_to_cones = left_to_cones(s);
+    if difference && leaves_to_cones && (*st).ray.depth >= frame.max_bounces { return; }
     let u = draw(st, select(SET_PATH_BSDF, SET_DIFFERENCE_BSDF, difference));
-    if u.w >= roulette.bsdf { return; }
+    if !plays(u, techniques.bsdf_probability) { return; }
     let b = bsdf_sample(s, wo, u.xyz);
     if !b.valid { return; }
-    let density = select(b.pdf, DELTA_DENSITY, b.delta);
-    var throughput = (*st).throughput * b.weight;
+    var segment = Segment(
+        b.wi,
+        select(b.pdf, DELTA_DENSITY, b.delta),
+        (*st).path.throughput * b.weight,
+        medium_along(st, s, b.wi),
+    );
     @if(!paper) {
         if difference {
-            (*st).pending |= PENDING_DIFFERENCE;
-            (*st).difference_position = (*st).position;
-            (*st).difference_offset = (*st).offset;
-            (*st).difference_coincidence_ratio = (*st).coincidence_ratio;
-            (*st).difference_t_min = (*st).real_t_min;
-            (*st).difference_depth = (*st).depth;
-            (*st).difference_direction = b.wi;
-            (*st).difference_left_to_cones = u32(left_to_cones(s));
-            (*st).difference_normal = s.ns;
-            (*st).difference_cone_probability = roulette.cone;
-            (*st).difference_density = select(b.pdf, DELTA_DENSITY, b.delta);
-            (*st).difference_throughput = throughput * (1.0 / roulette.bsdf);
-            (*st).difference_medium = medium_along(st, s, b.wi);
+            segment.throughput *= 1.0 / techniques.bsdf_probability;
+            (*st).path.pending |= PENDING_DIFFERENCE;
+            path_differences[(*st).lane] = DifferenceRay(
+                (*st).ray.origin,
+                segment,
+                s.ns,
+                techniques.cone_probability,
+                (*st).ray.depth,
+                select(REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, leaves_to_cones),
+                vec2<u32>(),
+            );
             return;
         }
     }
     @if(multi_bounce) {
-        if (*st).depth >= ROULETTE_FROM_DEPTH {
-            let survival = min(ROULETTE_GAIN * max_element(abs(throughput)), 1.0);
-            if u.w >= survival { return; }
-            throughput *= 1.0 / survival;
+        if (*st).ray.depth >= ROULETTE_FROM_DEPTH {
+            let survival = min(ROULETTE_GAIN * max_element(abs(segment.throughput)), 1.0);
+            if !plays(u, survival) { return; }
+            segment.throughput *= 1.0 / survival;
         }
     }
-    (*st).pending |= PENDING_NEXT;
-    (*st).next_direction = b.wi;
-    (*st).next_throughput = throughput;
-    (*st).next_density = density;
-    (*st).next_medium = medium_along(st, s, b.wi);
+    (*st).path.pending |= PENDING_NEXT;
+    path_nexts[(*st).lane] = segment;
 }

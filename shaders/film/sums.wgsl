@@ -4,37 +4,6 @@
 // error terms below into 0; every intermediate is therefore passed through `opaque`, an XOR with a word `zero` that the caller
 // reads from a uniform whose value is 0.
 
-struct Sum3 {
-    hi: array<f32, 3>,
-    lo: array<f32, 3>,
-}
-
-struct PixelSums {
-    m_im: Sum3,
-    diff: Sum3,
-    m_ir: Sum3,
-    r_ir: Sum3,
-    sq: Sum3,
-    n: u32,
-    m: u32,
-    n_real: u32,
-    non_finite: u32,
-    first_non_finite: u32,
-    sample_factor: u32,
-}
-
-struct GuideSums {
-    depth_hi: f32,
-    depth_lo: f32,
-    normal: Sum3,
-    albedo: Sum3,
-    hits: u32,
-    pad: u32,
-}
-
-// Bits of 1e15, the largest magnitude that is accumulated.
-const LARGEST_SAMPLE_BITS: u32 = 0x58635fa9u;
-
 fn opaque(x: f32, zero: u32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) ^ zero);
 }

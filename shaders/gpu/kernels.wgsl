@@ -5,26 +5,41 @@ import package::gpu::buffers::frame;
 import package::cpu::estimator::{advance, begin_sample};
 import package::film::sums::{guide_add, pixel_add, pixel_add_real};
 import package::gpu::lanes::{
-    append, batch, counters, guide_sums, indirect, paths, pixel_sums, queue_in, work,
-    COUNT_IN, COUNT_OUT, COUNT_RAYS, COUNT_STEPS, RAY_KINDS, WORKGROUP,
+    add_rays, append, batch, counters, guide_sums, indirect, pixel_sums, queue_in, work,
+    COUNT_IN, COUNT_OUT, COUNT_STEPS, WORKGROUP,
 };
 import package::cpu::request::answer;
-import package::cpu::state::{FAR, STAGE_DONE};
+import package::cpu::state::{
+    FAR, PathResult, PathState, REQUEST_CLOSEST_REAL, RayCounts, STAGE_DONE, path_first_hits, path_hits, path_radiances_real, path_rays,
+    path_results, paths,
+};
 
 @compute @workgroup_size(64)
 fn kernel_generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     let lane = id.x;
     var alive = false;
+    var rays: RayCounts;
     if lane < batch.lane_count {
         let item = work[lane % batch.pixel_count];
         let index = item.y + batch.sample_offset + lane / batch.pixel_count;
         if index < item.z {
-            var path = begin_sample(item.x, index, batch.real_pass != 0u);
-            paths[lane] = path;
-            alive = path.stage != STAGE_DONE;
+            let st = begin_sample(lane, item.x, index, batch.real_pass != 0u);
+            rays = st.rays;
+            path_results[lane] = PathResult(vec3<f32>(0.0), 0u);
+            @if(paper) { path_radiances_real[lane] = vec3<f32>(0.0); }
+            if batch.with_guides != 0u {
+                path_first_hits[lane].depth_m = FAR;
+            }
+            alive = st.path.stage != STAGE_DONE;
+            if alive {
+                path_rays[lane] = st.ray;
+                path_hits[lane] = st.hits;
+                paths[lane] = st.path;
+            }
         }
     }
     append(lane, alive, thread);
+    add_rays(rays, thread);
 }
 
 // The queue that was written becomes the one that is read.
@@ -41,40 +56,44 @@ fn kernel_turn() {
 
 @compute @workgroup_size(64)
 fn kernel_trace(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    var st: PathState;
     if id.x < atomicLoad(&counters[COUNT_IN]) {
         let lane = queue_in[id.x];
-        var path = paths[lane];
-        answer(&path, thread);
-        // The rest of the state is as it was.
-        paths[lane].hit_real = path.hit_real;
-        paths[lane].hit_virtual = path.hit_virtual;
-        paths[lane].rays = path.rays;
+        st.lane = lane;
+        st.ray = path_rays[lane];
+        answer(&st, thread);
+        path_hits[lane].in_real = st.hits.in_real;
+        // A request for the real hit alone leaves the other as it was: it need not be read for that.
+        if st.ray.request != REQUEST_CLOSEST_REAL {
+            path_hits[lane].in_virtual = st.hits.in_virtual;
+        }
     }
+    add_rays(st.rays, thread);
 }
 
 @compute @workgroup_size(64)
 fn kernel_advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    var lane = 0u;
+    var st: PathState;
     var alive = false;
     if id.x < atomicLoad(&counters[COUNT_IN]) {
-        lane = queue_in[id.x];
-        var path = paths[lane];
-        advance(&path);
-        paths[lane] = path;
-        alive = path.stage != STAGE_DONE;
+        let lane = queue_in[id.x];
+        st.lane = lane;
+        st.ray = path_rays[lane];
+        st.hits = path_hits[lane];
+        st.path = paths[lane];
+        advance(&st);
+        alive = st.path.stage != STAGE_DONE;
+        if alive {
+            path_rays[lane] = st.ray;
+            paths[lane] = st.path;
+        }
     }
-    append(lane, alive, thread);
+    append(st.lane, alive, thread);
 }
-
-var<workgroup> rays: array<atomic<u32>, 5>;
 
 // One thread sums all samples of one pixel, in their order.
 @compute @workgroup_size(64)
-fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    if thread < RAY_KINDS {
-        atomicStore(&rays[thread], 0u);
-    }
-    workgroupBarrier();
+fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>) {
     let slot = id.x;
     if slot < batch.pixel_count {
         let zero = batch.zero;
@@ -86,18 +105,19 @@ fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(loca
                 break;
             }
             let lane = k * batch.pixel_count + slot;
-            let is_virtual = paths[lane].mask != 0u;
-            let radiance = paths[lane].radiance * frame.exposure_scale;
+            let result = path_results[lane];
+            let is_virtual = result.mask != 0u;
+            let radiance = result.radiance * frame.exposure_scale;
             if batch.real_pass != 0u {
                 sums = pixel_add_real(sums, index, is_virtual, radiance, zero);
             } else {
                 @if(paper) {
-                    let real = paths[lane].radiance_real * frame.exposure_scale;
+                    let real = path_radiances_real[lane] * frame.exposure_scale;
                     // Later samples leave a gap in the real pass, which is replayed, once one was left out.
                     let real_is_next = sums.n_real == sums.n;
                     var contribution = radiance;
                     if !is_virtual {
-                        contribution = (paths[lane].radiance - paths[lane].radiance_real) * frame.exposure_scale;
+                        contribution = (result.radiance - path_radiances_real[lane]) * frame.exposure_scale;
                     }
                     sums = pixel_add(sums, index, is_virtual, contribution, zero);
                     if real_is_next {
@@ -107,21 +127,12 @@ fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(loca
                 @else {
                     sums = pixel_add(sums, index, is_virtual, radiance, zero);
                 }
-                let depth_m = paths[lane].depth_m;
-                if batch.with_guides != 0u && depth_m < FAR {
-                    guide_sums[slot] = guide_add(guide_sums[slot], depth_m, paths[lane].normal, paths[lane].albedo, zero);
+                if batch.with_guides != 0u && path_first_hits[lane].depth_m < FAR {
+                    let hit = path_first_hits[lane];
+                    guide_sums[slot] = guide_add(guide_sums[slot], hit.depth_m, hit.normal, hit.albedo, zero);
                 }
             }
-            atomicAdd(&rays[0], paths[lane].rays.primary);
-            atomicAdd(&rays[1], paths[lane].rays.mixed);
-            atomicAdd(&rays[2], paths[lane].rays.real);
-            atomicAdd(&rays[3], paths[lane].rays.mixed_shadow);
-            atomicAdd(&rays[4], paths[lane].rays.real_shadow);
         }
         pixel_sums[slot] = sums;
-    }
-    workgroupBarrier();
-    if thread < RAY_KINDS {
-        atomicAdd(&counters[COUNT_RAYS + thread], atomicLoad(&rays[thread]));
     }
 }

@@ -1,6 +1,6 @@
-// A batch of samples in flight: one lane each, its state in `paths`, the lanes that still want a ray in a queue.
+// A batch of samples in flight: one lane each, its state in the arrays of cpu/state.wgsl, the lanes that still want a ray in a queue.
 
-import package::cpu::state::PathState;
+import package::cpu::state::RayCounts;
 import package::film::sums::{PixelSums, GuideSums};
 
 // Uniform of a batch; src/gpu/lanes.rs has its twin.
@@ -31,14 +31,13 @@ const RAY_KINDS: u32 = 5u;
 @group(1) @binding(0) var<uniform> batch: Batch;
 // Pixel, first sample, end of the samples, by slot.
 @group(1) @binding(1) var<storage, read> work: array<vec4<u32>>;
-@group(1) @binding(2) var<storage, read_write> paths: array<PathState>;
-@group(1) @binding(3) var<storage, read> queue_in: array<u32>;
-@group(1) @binding(4) var<storage, read_write> queue_out: array<u32>;
-@group(1) @binding(5) var<storage, read_write> counters: array<atomic<u32>, 8>;
-@group(1) @binding(6) var<storage, read_write> indirect: array<u32, 3>;
+@group(1) @binding(2) var<storage, read> queue_in: array<u32>;
+@group(1) @binding(3) var<storage, read_write> queue_out: array<u32>;
+@group(1) @binding(4) var<storage, read_write> counters: array<atomic<u32>, 8>;
+@group(1) @binding(5) var<storage, read_write> indirect: array<u32, 3>;
 // By slot.
-@group(1) @binding(7) var<storage, read_write> pixel_sums: array<PixelSums>;
-@group(1) @binding(8) var<storage, read_write> guide_sums: array<GuideSums>;
+@group(1) @binding(6) var<storage, read_write> pixel_sums: array<PixelSums>;
+@group(1) @binding(7) var<storage, read_write> guide_sums: array<GuideSums>;
 
 var<workgroup> appended: atomic<u32>;
 var<workgroup> first_place: u32;
@@ -60,5 +59,25 @@ fn append(lane: u32, alive: bool, thread: u32) {
     workgroupBarrier();
     if alive {
         queue_out[first_place + rank] = lane;
+    }
+}
+
+var<workgroup> counted: array<atomic<u32>, 5>;
+
+// Counts rays that this thread has traced. All threads of the workgroup call it.
+fn add_rays(rays: RayCounts, thread: u32) {
+    if thread < RAY_KINDS {
+        atomicStore(&counted[thread], 0u);
+    }
+    workgroupBarrier();
+    if rays.primary > 0u { atomicAdd(&counted[0], rays.primary); }
+    if rays.mixed > 0u { atomicAdd(&counted[1], rays.mixed); }
+    if rays.real > 0u { atomicAdd(&counted[2], rays.real); }
+    if rays.mixed_shadow > 0u { atomicAdd(&counted[3], rays.mixed_shadow); }
+    if rays.real_shadow > 0u { atomicAdd(&counted[4], rays.real_shadow); }
+    workgroupBarrier();
+    if thread < RAY_KINDS {
+        let sum = atomicLoad(&counted[thread]);
+        if sum > 0u { atomicAdd(&counters[COUNT_RAYS + thread], sum); }
     }
 }

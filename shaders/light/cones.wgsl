@@ -1,15 +1,8 @@
 // The cones in which the virtual geometry's bounding spheres are seen from a point. Rust twin: src/light/cones.rs.
 
 import package::gpu::buffers::frame;
-import package::math::{cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
+import package::math::{PI, cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
 
-const PI: f32 = 3.14159265358979;
-const WIDE_SIN2: f32 = 0.5;
-const CONE_PADDING: f32 = 1e-5;
-const CONE_PADDING_SIN2: f32 = 1e-9;
-const SPHERE_PADDING: f32 = 1e-3;
-const SPHERE_PADDING_DISTANCE2: f32 = 2e-10;
-const COSINE_PADDING: f32 = 1e-6;
 
 struct Cone {
     axis: vec3<f32>,

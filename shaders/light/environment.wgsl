@@ -2,9 +2,7 @@
 
 import package::gpu::buffers::frame;
 @if(environment_map) import package::gpu::buffers::{env_cdf, env_texels};
-import package::math::{atan2_, luminance, safe_sqrt, sincos_2pi};
-
-const PI: f32 = 3.14159265358979;
+import package::math::{PI, atan2_, luminance, safe_sqrt, sincos_2pi};
 
 struct EnvSample {
     direction: vec3<f32>,

@@ -1,7 +1,7 @@
 // Choosing a light and a point on it. Rust twin: src/light/lights.rs.
 
 import package::gpu::buffers::{frame, lights};
-import package::packed::records::{LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light};
+import package::packed::records::{LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, SIDE_REAL};
 import package::shared::NONE;
 import package::light::environment::{env_evaluate, env_radiance, env_sample};
 import package::math::{cross3, dot3, length3, safe_sqrt};
@@ -19,7 +19,7 @@ struct LightSample {
 }
 
 fn no_light() -> LightSample {
-    return LightSample(vec3<f32>(0.0, 0.0, 1.0), 0.0, vec3<f32>(0.0), 0.0, false, 0u);
+    return LightSample(vec3<f32>(0.0, 0.0, 1.0), 0.0, vec3<f32>(0.0), 0.0, false, SIDE_REAL);
 }
 
 fn light_select(u: f32, coin: f32) -> u32 {

@@ -1,13 +1,8 @@
 // Rectangular lights by solid angle. Rust twin: src/light/rectangle.rs, where the formulas are explained.
 
 import package::packed::records::{LIGHT_QUAD, Light};
-import package::math::{atan2_, cross3, dot3, length3, safe_sqrt, sincos_2pi};
+import package::math::{INV_TAU, TAU, atan2_, cross3, dot3, length3, safe_sqrt, sincos_2pi};
 
-const MIN_SOLID_ANGLE: f32 = 0.02;
-const RIGHT_ANGLE: f32 = 1e-5;
-const FARTHEST: f32 = 3e4;
-const INV_TAU: f32 = 0.15915494;
-const TAU: f32 = 6.2831853;
 
 struct Rectangle {
     ex: vec3<f32>,

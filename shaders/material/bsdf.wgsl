@@ -7,13 +7,10 @@ import package::material::lobes::{
     Lobes, NO_ALBEDO, coat_delta, cos_to, diffuse_albedo, diffuse_color, grazing_albedo, interface_at, lambert_cos, lobes_at, max3,
     opaque_fresnel, reflects_delta, scatters_nothing, surface_index, thin_walled, transmits_delta,
 };
-import package::math::{dot3, orthonormal_basis, sincos_2pi};
+import package::math::{INV_PI, dot3, orthonormal_basis, sincos_2pi};
 import package::material::normal::unit;
 import package::material::surface::Surface;
 
-const GRAZING_LIFT: f32 = 1e-4;
-const LARGEST_BELOW_1: f32 = 0.99999994;
-const INV_PI: f32 = 0.318309886;
 
 struct BsdfEval {
     f_cos: vec3<f32>,

@@ -1,10 +1,8 @@
 // Twin of src/material/ggx.rs: the same operations in the same order.
 
-import package::math::{dot3, orthonormal_basis, sincos_2pi};
+import package::math::{INV_PI, dot3, orthonormal_basis, sincos_2pi};
 import package::material::normal::unit;
 
-const MIN_COS: f32 = 1e-7;
-const INV_PI: f32 = 0.318309886;
 
 fn smith_l(alpha: f32, c: f32) -> f32 {
     let a2 = alpha * alpha;

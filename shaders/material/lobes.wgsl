@@ -6,10 +6,6 @@ import package::material::ggx::MIN_COS;
 import package::math::dot3;
 import package::material::surface::Surface;
 
-const DELTA_ALPHA: f32 = 1e-3;
-const DELTA_BEND: f32 = 1e-4;
-const COAT_F0: f32 = 0.04;
-const NO_ALBEDO: f32 = 1e-30;
 
 struct Interface {
     reflected: vec3<f32>,

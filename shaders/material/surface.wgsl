@@ -12,11 +12,6 @@ import package::material::normal::{mapped_normal, tangent_from_uv, triangle_norm
 import package::material::texture::{slot, slot_rgb, texture_sample};
 import package::accel::trace::Hit;
 
-const GAMMA_7: f32 = 4.172327e-7;
-const BARYCENTRIC_ERROR: f32 = 1.1920929e-7;
-const PLANE_ERROR: f32 = 2.3841858e-7;
-const SLIMMEST: f32 = 1e-4;
-const PHOTO_DEPTH_TOLERANCE: f32 = 0.02;
 
 struct Surface {
     position: vec3<f32>,

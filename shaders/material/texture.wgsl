@@ -1,21 +1,8 @@
 // Twin of src/material/texture.rs: the same operations in the same order.
 
 import package::gpu::buffers::{texels, texture_refs};
-import package::packed::records::{TextureRef, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1, TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT};
+import package::packed::records::{TextureRef, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1, TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT, WRAP_MIRROR, WRAP_REPEAT};
 import package::shared::NONE;
-
-const WRAP_REPEAT: u32 = 0u;
-const WRAP_MIRROR: u32 = 1u;
-const INV_255: f32 = 0.003921568859;
-const P0: f32 = 0.708485007;
-const P1: f32 = 0.871979892;
-const P2: f32 = -0.134144574;
-const P3: f32 = 0.0827335194;
-const P4: f32 = -0.0702575296;
-const P5: f32 = 0.0638006479;
-const P6: f32 = -0.0654095411;
-const P7: f32 = 0.133244053;
-const P8: f32 = -0.172349691;
 
 fn srgb_decode(encoded: f32) -> f32 {
     if encoded <= 0.04045 {
@@ -26,15 +13,15 @@ fn srgb_decode(encoded: f32) -> f32 {
     }
     let x = (encoded + 0.055) * (1.0 / 1.055);
     let w = sqrt(x) - 0.65;
-    var p = P8;
-    p = p * w + P7;
-    p = p * w + P6;
-    p = p * w + P5;
-    p = p * w + P4;
-    p = p * w + P3;
-    p = p * w + P2;
-    p = p * w + P1;
-    p = p * w + P0;
+    var p = POWER_04[8];
+    p = p * w + POWER_04[7];
+    p = p * w + POWER_04[6];
+    p = p * w + POWER_04[5];
+    p = p * w + POWER_04[4];
+    p = p * w + POWER_04[3];
+    p = p * w + POWER_04[2];
+    p = p * w + POWER_04[1];
+    p = p * w + POWER_04[0];
     return x * x * p;
 }
 

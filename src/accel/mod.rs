@@ -20,7 +20,7 @@ mod compressed;
 mod large_pages;
 mod spheres;
 mod stack;
-mod trace;
+pub(crate) mod trace;
 mod wide;
 
 #[cfg(test)]
@@ -36,6 +36,7 @@ use thiserror::Error;
 
 use crate::packed::NONE;
 use compressed::CompressedBvh;
+pub use trace::Hit;
 use trace::Kernel;
 use wide::WideBvh;
 
@@ -61,17 +62,6 @@ pub struct Ray {
     pub t_max: f32,
     /// [`NONE`] excludes all hits at exactly `t_min`.
     pub skip: u32,
-}
-
-/// Where a ray met a triangle: `(1 - u - v) * v0 + u * v1 + v * v2`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    /// Distance; infinite on a miss.
-    pub t: f32,
-    pub u: f32,
-    pub v: f32,
-    /// Global triangle id, [`NONE`] on a miss.
-    pub triangle: u32,
 }
 
 impl Hit {

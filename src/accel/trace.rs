@@ -1,7 +1,21 @@
 //! Traversal of the CPU's tree and the triangle test. Twin of `shaders/accel/trace.wgsl`: the triangle test there does the same f32 operations.
 
+use super::Ray;
 use super::wide::{Eight, TriangleBlock, WideBvh, WideNode};
-use super::{Hit, Ray};
+use crate::shared::shared;
+
+shared! {
+    /// Where a ray met a triangle: `(1 - u - v) * v0 + u * v1 + v * v2`.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Hit {
+        /// Distance; infinite on a miss.
+        pub t: f32,
+        pub u: f32,
+        pub v: f32,
+        /// Global triangle id, [`NONE`](crate::shared::NONE) on a miss.
+        pub triangle: u32,
+    }
+}
 
 /// Factor by which a box may be farther than a hit: 16 units of rounding (see the module's proof).
 pub(super) const BOX_MARGIN: f32 = 1.0 + 1.0 / (1 << 20) as f32;

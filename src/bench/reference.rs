@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::{ReferenceNote, Truth};
+use crate::files;
 use crate::film::Picture;
-use crate::output::{ChannelFile, OutputError, Target, write_reference};
+use crate::output::{ChannelFile, Format, OutputError, Target, write_reference};
 use crate::renderer::{Budget, RenderError, Renderer, RendererOptions, Watcher};
 use crate::scene::{Choice, Composite, Estimator, Photo, SamplerKind, Scene};
 
@@ -80,6 +81,8 @@ pub fn reference(
         Source::Given(path) => given(scene, path, watcher),
         Source::Folder(folder) => {
             let path = folder.join(file_name(&scene));
+            // Kept from run to run, and made anew if it is not good enough.
+            files::own(&path).map_err(OutputError::from)?;
             if let Some(kept) = kept(&scene, &path, goal) {
                 return Ok(Some(kept));
             }
@@ -141,7 +144,7 @@ fn keep(
         (RAYS, note.rays_per_pixel.to_string()),
         (SCRAMBLES_MADE, note.scrambles.to_string()),
     ];
-    let target = Target::picture(path)?;
+    let target = Target::named(path, Format::Exr);
     write_reference(
         &target,
         &truth.picture,

@@ -7,17 +7,15 @@ use glam::{DVec3, Vec3};
 
 use super::distortion;
 use super::shutter::{CameraPose, camera_pose};
-use crate::math::{dot3, normalize3, sincos_2pi};
-use crate::packed::Frame;
+use crate::math::{INV_TAU, dot3, normalize3, sincos_2pi};
+use crate::packed::{APERTURE_DISC, APERTURE_SQUARE, Frame};
 use crate::scene::{Aperture, Camera, Lens};
+use crate::shared::shared;
 
-/// `Frame::aperture_shape`; 3 and above is a number of blades.
-pub const APERTURE_DISC: u32 = 0;
-pub const APERTURE_SQUARE: u32 = 1;
-
-/// Newton steps that a ray spends on the distortion; [`check_distortion`] proves them enough for a camera.
-const UNDISTORT_STEPS: u32 = 8;
-const INV_TAU: f32 = 0.159_154_94;
+shared! {
+    /// Newton steps that a ray spends on the distortion; [`check_distortion`] proves them enough for a camera.
+    const UNDISTORT_STEPS: u32 = 8;
+}
 
 /// What a camera's distortion makes impossible.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -11,14 +11,32 @@
 //! Everything up to the last conversion is integer arithmetic: the WGSL twin `shaders/camera/sampler.wgsl` agrees bit for bit.
 
 use crate::math::{hash_combine, hash_u32, uniform_from_bits};
+use crate::packed::{SAMPLER_CMJ, SAMPLER_JITTERED};
+use crate::shared::shared;
 
-/// `Frame::sampler` and [`SampleKey::sampler`].
-pub const SAMPLER_JITTERED: u32 = 0;
-pub const SAMPLER_CMJ: u32 = 1;
-pub const SAMPLER_SOBOL: u32 = 2;
+shared! {
+    /// Most rays per pixel that a stratified grid is laid out for.
+    pub const MAX_TOTAL: u32 = 1 << 30;
 
-/// Most rays per pixel that a stratified grid is laid out for.
-pub const MAX_TOTAL: u32 = 1 << 30;
+    /// Sets the scrambles of a set's four numbers apart.
+    const SOBOL_SEEDS: [u32; 4] = [0xbb67_ae85, 0x5be0_cd19, 0xcbbb_9d5d, 0x629a_292a];
+
+    /// Direction numbers of dimension 2, bits reversed (Joe and Kuo 2008: polynomial x^2 + x + 1, m = 1 3).
+    const SOBOL_2: [u32; 32] = [
+        0x00000001, 0x00000003, 0x00000006, 0x00000009, 0x00000017, 0x0000003a, 0x00000071, 0x000000a3,
+        0x00000116, 0x00000339, 0x00000677, 0x000009aa, 0x00001601, 0x00003903, 0x00007706, 0x0000aa09,
+        0x00010117, 0x0003033a, 0x00060671, 0x000909a3, 0x00171616, 0x003a3939, 0x00717777, 0x00a3aaaa,
+        0x01170001, 0x033a0003, 0x06710006, 0x09a30009, 0x16160017, 0x3939003a, 0x77770071, 0xaaaa00a3,
+    ];
+
+    /// Direction numbers of dimension 3, bits reversed (polynomial x^3 + x + 1, m = 1 3 1).
+    const SOBOL_3: [u32; 32] = [
+        0x00000001, 0x00000003, 0x00000004, 0x0000000a, 0x0000001f, 0x0000002e, 0x00000045, 0x000000c9,
+        0x0000011b, 0x000002a4, 0x0000079a, 0x00000b67, 0x0000101e, 0x0000302d, 0x00004041, 0x0000a0c3,
+        0x0001f104, 0x0002e28a, 0x000457df, 0x000c9bae, 0x0011a105, 0x002a7289, 0x0079e7db, 0x00b6dba4,
+        0x0100011a, 0x030002a7, 0x0400079e, 0x0a000b6d, 0x1f001001, 0x2e003003, 0x45004004, 0xc900a00a,
+    ];
+}
 
 /// What a sample's values depend on, besides the set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -45,28 +63,29 @@ pub struct SampleSet {
     order: [usize; 4],
 }
 
-impl SampleSet {
-    #[inline]
-    pub fn new(key: SampleKey, set_id: u32) -> Self {
-        let stream = hash_combine(hash_combine(key.seed, key.pixel), set_id);
-        // Set 0 needs both its pairs: dimensions 2 and 3 make the poorest plane of the four (10 to 25% more error at 8 to 25 samples of a
-        // blurred edge), so no pair holds both. The other sets have one pair that matters, and dimensions 0 and 1 make the best plane. An
-        // order of its own keeps the sets of one sample independent of each other.
-        let (point, order) = if set_id == 0 {
-            (key.index, [1, 3, 0, 2])
-        } else {
-            let seed = hash_u32(stream ^ 0x3c6e_f372);
-            let shuffled = owen_scramble(key.index.reverse_bits(), seed);
-            (shuffled.reverse_bits(), [0, 1, 2, 3])
-        };
-        Self {
-            key,
-            stream,
-            point,
-            order,
-        }
+/// The numbers of set `set_id` of a sample.
+#[inline]
+pub fn sample_set(key: SampleKey, set_id: u32) -> SampleSet {
+    let stream = hash_combine(hash_combine(key.seed, key.pixel), set_id);
+    // Set 0 needs both its pairs: dimensions 2 and 3 make the poorest plane of the four (10 to 25% more error at 8 to 25 samples of a
+    // blurred edge), so no pair holds both. The other sets have one pair that matters, and dimensions 0 and 1 make the best plane. An
+    // order of its own keeps the sets of one sample independent of each other.
+    let (point, order) = if set_id == 0 {
+        (key.index, [1, 3, 0, 2])
+    } else {
+        let seed = hash_u32(stream ^ 0x3c6e_f372);
+        let shuffled = owen_scramble(key.index.reverse_bits(), seed);
+        (shuffled.reverse_bits(), [0, 1, 2, 3])
+    };
+    SampleSet {
+        key,
+        stream,
+        point,
+        order,
     }
+}
 
+impl SampleSet {
     /// The first two: a point spread over the unit square.
     #[inline]
     pub fn pair(&self) -> [f32; 2] {
@@ -125,10 +144,10 @@ impl SampleSet {
         };
         let jitter = hash_combine(self.stream, self.key.index);
         if pair == 0 {
-            grid.point(self.stream ^ 0x2c1b_3c6d, self.key.index, jitter)
+            grid.grid_point(self.stream ^ 0x2c1b_3c6d, self.key.index, jitter)
         } else {
             let jitter = hash_u32(jitter ^ 0x6b43_a9b5);
-            grid.point(self.stream ^ 0x297a_2d39, self.key.index, jitter)
+            grid.grid_point(self.stream ^ 0x297a_2d39, self.key.index, jitter)
         }
     }
 
@@ -141,7 +160,7 @@ impl SampleSet {
 
 /// All four numbers of a set.
 pub fn sample_4d(key: SampleKey, set_id: u32) -> [f32; 4] {
-    let set = SampleSet::new(key, set_id);
+    let set = sample_set(key, set_id);
     let ([x, y], [z, w]) = (set.pair(), set.second_pair());
     [x, y, z, w]
 }
@@ -168,7 +187,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn point(&self, stream: u32, index: u32, jitter: u32) -> [u32; 2] {
+    fn grid_point(&self, stream: u32, index: u32, jitter: u32) -> [u32; 2] {
         let &Grid { columns, rows, .. } = self;
         let cells = columns * rows;
         let cell = permute(index % cells, cells, hash_u32(stream ^ 0x8f74_39b1));
@@ -230,9 +249,6 @@ fn mix_masked(i: u32, key: u32, mask: u32, shift: u32) -> u32 {
     affine ^ (affine >> shift)
 }
 
-/// Sets the scrambles of a set's four numbers apart.
-const SOBOL_SEEDS: [u32; 4] = [0xbb67_ae85, 0x5be0_cd19, 0xcbbb_9d5d, 0x629a_292a];
-
 /// Nested uniform scramble of a number whose most significant digit is bit 0: a bit is flipped by a hash of the seed and of the bits
 /// below it alone. Only xor with an even multiple, odd factors and sums carry upwards, so every step keeps that property
 /// (construction of Laine and Karras; constants by Vegdahl 2021).
@@ -269,36 +285,19 @@ fn sobol_reversed(point: u32, dimension: usize) -> u32 {
 }
 
 /// Sums of the direction numbers of dimensions 2 and 3 over the bits of each hexadecimal digit: eight steps instead of 32.
-static SOBOL_23_DIGITS: [[[u32; 16]; 8]; 2] = [digit_sums(&SOBOL_2), digit_sums(&SOBOL_3)];
-
-const fn digit_sums(numbers: &[u32; 32]) -> [[u32; 16]; 8] {
-    let mut sums = [[0; 16]; 8];
+static SOBOL_23_DIGITS: [[[u32; 16]; 8]; 2] = {
+    let mut sums = [[[0; 16]; 8]; 2];
     let mut i = 0;
     while i < 8 * 16 * 4 {
         let (digit, value, bit) = (i / 64, i / 4 % 16, i % 4);
         if (value >> bit) & 1 == 1 {
-            sums[digit][value] ^= numbers[4 * digit + bit];
+            sums[0][digit][value] ^= SOBOL_2[4 * digit + bit];
+            sums[1][digit][value] ^= SOBOL_3[4 * digit + bit];
         }
         i += 1;
     }
     sums
-}
-
-/// Direction numbers of dimension 2, bits reversed (Joe and Kuo 2008: polynomial x^2 + x + 1, m = 1 3).
-const SOBOL_2: [u32; 32] = [
-    0x00000001, 0x00000003, 0x00000006, 0x00000009, 0x00000017, 0x0000003a, 0x00000071, 0x000000a3,
-    0x00000116, 0x00000339, 0x00000677, 0x000009aa, 0x00001601, 0x00003903, 0x00007706, 0x0000aa09,
-    0x00010117, 0x0003033a, 0x00060671, 0x000909a3, 0x00171616, 0x003a3939, 0x00717777, 0x00a3aaaa,
-    0x01170001, 0x033a0003, 0x06710006, 0x09a30009, 0x16160017, 0x3939003a, 0x77770071, 0xaaaa00a3,
-];
-
-/// Direction numbers of dimension 3, bits reversed (polynomial x^3 + x + 1, m = 1 3 1).
-const SOBOL_3: [u32; 32] = [
-    0x00000001, 0x00000003, 0x00000004, 0x0000000a, 0x0000001f, 0x0000002e, 0x00000045, 0x000000c9,
-    0x0000011b, 0x000002a4, 0x0000079a, 0x00000b67, 0x0000101e, 0x0000302d, 0x00004041, 0x0000a0c3,
-    0x0001f104, 0x0002e28a, 0x000457df, 0x000c9bae, 0x0011a105, 0x002a7289, 0x0079e7db, 0x00b6dba4,
-    0x0100011a, 0x030002a7, 0x0400079e, 0x0a000b6d, 0x1f001001, 0x2e003003, 0x45004004, 0xc900a00a,
-];
+};
 
 #[cfg(test)]
 mod tests;

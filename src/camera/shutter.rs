@@ -7,9 +7,12 @@ use glam::{DMat4, DQuat, DVec3, Vec3};
 
 use super::sampler::{SampleKey, sample_4d};
 use crate::packed::{FRAME_SHUTTER_ORDERED, Frame, SHUTTER_POSES};
+use crate::shared::shared;
 
-/// Pixel and lens are set 0; the vertices' sets begin at 7.
-const SHUTTER_SET: u32 = 1;
+shared! {
+    /// Pixel and lens are set 0; the vertices' sets begin at 7.
+    const SHUTTER_SET: u32 = 1;
+}
 
 /// Anchor-relative position in metres, and unit axes.
 #[derive(Clone, Copy, Debug, PartialEq)]

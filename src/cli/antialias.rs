@@ -8,7 +8,7 @@ use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
 use super::values::unit;
 use super::{Failure, Outcome, print, say};
-use crate::output::{Target, check_distinct, write_composite};
+use crate::output::{Target, write_composite};
 use crate::scene::AntialiasSettings;
 use crate::stages::antialias::antialias;
 
@@ -31,7 +31,6 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let target = Target::picture(&arguments.output)?;
-    check_distinct(&[&arguments.output], &arguments.layers.paths())?;
     let mut layers = arguments.layers.read()?;
     let settings = AntialiasSettings {
         beta: arguments.beta,

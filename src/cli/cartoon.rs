@@ -1,6 +1,6 @@
 //! `mixray cartoon`: any picture as a cartoon.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
@@ -9,7 +9,7 @@ use clap::builder::PossibleValuesParser;
 use super::stage_device::StageDevice;
 use super::values::{unit, within};
 use super::{Failure, Outcome, print, read_photo};
-use crate::output::{PngBits, Target, check_distinct, write_image};
+use crate::output::{PngBits, Target, write_image};
 use crate::scene::{CartoonSettings, CartoonStyle, Choice};
 use crate::stages::EncodedImage;
 use crate::stages::cartoon::{EdgeResponses, cartoon};
@@ -118,13 +118,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         .as_deref()
         .map(Target::picture)
         .transpose()?;
-    let outputs = [Some(&arguments.output), arguments.edges.as_ref()];
-    let outputs: Vec<&Path> = outputs
-        .into_iter()
-        .flatten()
-        .map(PathBuf::as_path)
-        .collect();
-    check_distinct(&outputs, std::slice::from_ref(&arguments.image))?;
     let photo = read_photo(&arguments.image)?;
     let bits = PngBits::for_photo(Some(&photo));
     let image = EncodedImage::from_photo(&photo);

@@ -40,11 +40,6 @@ pub(super) struct Layers {
 }
 
 impl LayerArguments {
-    /// The files that are read.
-    pub(super) fn paths(&self) -> [PathBuf; 3] {
-        [self.photo.clone(), self.layer.clone(), self.mask.clone()]
-    }
-
     pub(super) fn read(&self) -> Result<Layers, Failure> {
         let photo = read_photo(&self.photo)?;
         let layer = read_photo(&self.layer)?;

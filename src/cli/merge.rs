@@ -9,7 +9,7 @@ use super::render::write;
 use super::values::png_bits;
 use super::{Failure, Outcome, print, say};
 use crate::film::Film;
-use crate::output::{FilmNote, PngBits, Target, check_distinct, read_film};
+use crate::output::{FilmNote, PngBits, Target, read_film};
 use crate::renderer::{Progress, Renderer, Watcher};
 use crate::scene::{self, BackendChoice, Scene};
 
@@ -60,14 +60,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         return Err(Failure("there is nothing to merge".to_owned()));
     };
     let scene = load(&first, arguments.scene.as_deref())?;
-    let outputs: Vec<&Path> = arguments.output.iter().map(PathBuf::as_path).collect();
-    let inputs: Vec<PathBuf> = scene
-        .inputs
-        .iter()
-        .chain(&arguments.parts)
-        .cloned()
-        .collect();
-    check_distinct(&outputs, &inputs)?;
     let (mut film, mut range) = (first.film, first.note.range);
     for part in parts {
         film.merge(&part.film)

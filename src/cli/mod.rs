@@ -20,16 +20,18 @@ mod render;
 mod sequence;
 mod stage_device;
 mod summary;
+mod terminal;
 mod threads;
 mod values;
 
-use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::files;
 use crate::scene::Photo;
+use terminal::{print, say};
 
 /// Renders virtual objects into photographs as the same camera would have taken them.
 #[derive(Debug, Parser)]
@@ -77,7 +79,10 @@ pub fn run() -> ExitCode {
 }
 
 fn run_command() -> ExitCode {
-    let result = match Arguments::parse().command {
+    interrupt::survive_file_limits();
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| end_with_usage(&error));
+    files::guard_run();
+    let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Sequence(arguments) => sequence::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
@@ -94,6 +99,8 @@ fn run_command() -> ExitCode {
         Ok(Outcome::CheckFailed) => ExitCode::from(1),
         Ok(Outcome::Interrupted) => ExitCode::from(130),
         Err(Failure(message)) => {
+            // What met a conflict of files may have wrapped it in its own words.
+            let message = files::conflict().map_or(message, |conflict| conflict.to_string());
             say("error", &message);
             ExitCode::from(2)
         }
@@ -115,23 +122,13 @@ fn read_photo(path: &Path) -> Result<Photo, Failure> {
     Ok(photo)
 }
 
-/// A message to the user, one line.
-fn say(kind: &str, message: &str) {
-    let line = message.trim().replace(['\r', '\n', '\t'], " ");
-    // Without a stderr there is nobody to tell.
-    let _ = writeln!(std::io::stderr(), "{kind}: {line}");
-}
-
-/// A result to stdout. A reader that has heard enough (a closed pipe) is no failure.
-fn print(text: &str) -> Result<(), Failure> {
-    let mut stdout = std::io::stdout();
-    let written = stdout
-        .write_all(text.as_bytes())
-        .and_then(|()| stdout.flush());
-    match written {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure(format!(
-            "the result cannot be written to standard output: {error}"
-        ))),
-        _ => Ok(()),
+/// Help, or why the command line cannot be used. Names of files stand in it too.
+fn end_with_usage(error: &clap::Error) -> ! {
+    let text = error.render().to_string();
+    let safe = terminal::escaped(&text);
+    if safe != text {
+        terminal::print_aside(&text);
+        std::process::exit(error.exit_code());
     }
+    error.exit()
 }

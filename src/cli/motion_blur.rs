@@ -8,7 +8,7 @@ use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
 use super::values::{unit, within};
 use super::{Failure, Outcome, print, say};
-use crate::output::{Target, check_distinct, write_composite};
+use crate::output::{Target, write_composite};
 use crate::scene::MotionBlurSettings;
 use crate::stages::motion_blur::{Copies, draw_copies};
 
@@ -56,7 +56,6 @@ fn step(text: &str) -> Result<f32, &'static str> {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let target = Target::picture(&arguments.output)?;
-    check_distinct(&[&arguments.output], &arguments.layers.paths())?;
     let mut layers = arguments.layers.read()?;
     let settings = MotionBlurSettings {
         min_length_px: arguments.min_length,

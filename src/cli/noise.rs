@@ -10,7 +10,7 @@ use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
 use super::values::within;
 use super::{Failure, Outcome, print, progress, say};
-use crate::output::{Target, check_distinct, check_writable, write_composite, write_text};
+use crate::output::{Target, check_writable, write_composite, write_text};
 use crate::scene::{Choice, NoiseFit, NoiseMethod, NoiseProfile, NoiseSettings};
 use crate::stages::calibration::{calibrate, group_frames, report_html};
 use crate::stages::noise::{NoiseInput, NoiseStage};
@@ -142,13 +142,6 @@ fn run_calibrate(arguments: &Calibrate) -> Result<Outcome, Failure> {
     if let Some(report) = &arguments.report {
         check_writable(report)?;
     }
-    let outputs = [Some(&arguments.output), arguments.report.as_ref()];
-    let outputs: Vec<&Path> = outputs
-        .into_iter()
-        .flatten()
-        .map(PathBuf::as_path)
-        .collect();
-    check_distinct(&outputs, &arguments.frames)?;
     if let Some(fit) = arguments.from {
         if fit.variance(0.0).max(fit.variance(255.0)) <= 0.0 {
             return Err(Failure(
@@ -165,11 +158,6 @@ fn run_calibrate(arguments: &Calibrate) -> Result<Outcome, Failure> {
         return Ok(Outcome::Done);
     }
     let scenes = group_frames(&arguments.frames)?;
-    let frames: Vec<PathBuf> = scenes
-        .iter()
-        .flat_map(|scene| scene.paths.clone())
-        .collect();
-    check_distinct(&outputs, &frames)?;
     let bar = progress::Count::new("frames read");
     let result = calibrate(&scenes, arguments.bins, &mut |done, total| {
         bar.show(done, total);
@@ -226,11 +214,6 @@ fn summary(profile: &NoiseProfile, output: &Path) -> String {
 
 fn run_apply(arguments: &Apply) -> Result<Outcome, Failure> {
     let target = Target::picture(&arguments.output)?;
-    let [photo, layer, mask] = arguments.layers.paths();
-    check_distinct(
-        &[&arguments.output],
-        &[photo, layer, mask, arguments.profile.clone()],
-    )?;
     let profile = NoiseProfile::read(&arguments.profile)
         .map_err(|problem| Failure(format!("{}: {problem}", arguments.profile.display())))?;
     let method = match arguments.method.as_deref().and_then(NoiseMethod::from_name) {

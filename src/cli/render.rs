@@ -1,6 +1,6 @@
 //! `mixray render`: a scene file to pictures.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
@@ -10,8 +10,8 @@ use super::progress::Bar;
 use super::values::{above_zero, camera_noise, whole_range};
 use super::{Failure, Outcome, interrupt, print, say, summary};
 use crate::output::{
-    FilmNote, Format, Metadata, PngBits, Target, check_distinct, check_writable, write_exr,
-    write_film, write_png, write_text,
+    FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr, write_film, write_png,
+    write_text,
 };
 use crate::renderer::{
     Budget, CameraNoise, ErrorGoal, Progress, Renderer, RendererOptions, SCRAMBLES, Stats, Watcher,
@@ -158,10 +158,6 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         )))?],
         given => given.to_vec(),
     };
-    let outputs: Vec<&Path> = (targets.iter().map(Target::path))
-        .chain(job.flags.stats.as_deref())
-        .collect();
-    check_distinct(&outputs, &scene.inputs)?;
     let load_secs = start.elapsed().as_secs_f64();
 
     let options = RendererOptions {

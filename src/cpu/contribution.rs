@@ -3,34 +3,34 @@
 use glam::Vec3;
 
 use super::state::*;
-use crate::camera::sampler::{SampleKey, SampleSet};
-use crate::packed::PackedScene;
+use crate::camera::sampler::{SampleKey, SampleSet, sample_set};
+use crate::packed::{ESTIMATOR_PAPER, PackedScene};
+use crate::shared::shared;
 
-// Sample sets: 0 is pixel and lens, then five a depth from 7 on.
-pub const SET_DIFFERENCE_LIGHT: u32 = 0;
-pub const SET_DIFFERENCE_BSDF: u32 = 1;
-pub const SET_DIFFERENCE_CONE: u32 = 2;
-pub const SET_PATH_LIGHT: u32 = 3;
-pub const SET_PATH_BSDF: u32 = 4;
-const SETS_PER_DEPTH: u32 = 5;
-const FIRST_DEPTH_SET: u32 = 2;
-
-pub const ESTIMATOR_DIRECT: u32 = 0;
-pub const ESTIMATOR_PAPER: u32 = 1;
+shared! {
+    // Sample sets: 0 is pixel and lens, then five a depth from 7 on.
+    pub const SET_DIFFERENCE_LIGHT: u32 = 0;
+    pub const SET_DIFFERENCE_BSDF: u32 = 1;
+    pub const SET_DIFFERENCE_CONE: u32 = 2;
+    pub const SET_PATH_LIGHT: u32 = 3;
+    pub const SET_PATH_BSDF: u32 = 4;
+    const SETS_PER_DEPTH: u32 = 5;
+    const FIRST_DEPTH_SET: u32 = 2;
+}
 
 /// Random numbers of one decision at the present vertex, computed when asked for. The samplers spread the first pair of a set best: it is what
 /// directions and points on lights are found by. (The shader computes all four at once, as a vector.)
 #[inline]
 pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> SampleSet {
-    let set = FIRST_DEPTH_SET + st.depth * SETS_PER_DEPTH + purpose;
-    SampleSet::new(sample_key(scene, st), set)
+    let set = FIRST_DEPTH_SET + st.ray.depth * SETS_PER_DEPTH + purpose;
+    sample_set(sample_key(scene, st), set)
 }
 
 pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {
     SampleKey {
-        pixel: st.pixel,
-        index: st.index,
-        total: scene.frame.rays_total * scene.pixels[st.pixel as usize].sample_factor,
+        pixel: st.path.pixel,
+        index: st.path.index,
+        total: scene.frame.rays_total * scene.pixels[st.path.pixel as usize].sample_factor,
         seed: scene.frame.seed,
         sampler: scene.frame.sampler,
     }
@@ -40,18 +40,18 @@ pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {
 pub fn accumulate(scene: &PackedScene, st: &mut PathState, light: Vec3) {
     let paper = scene.frame.estimator == ESTIMATOR_PAPER;
     let mut light = light;
-    if st.indirect {
+    if st.path.indirect != 0 {
         // How many samples this one stands for does not change what it is clamped to.
-        let limit = scene.frame.clamp_indirect * st.weight;
+        let limit = scene.frame.clamp_indirect * st.path.weight;
         let largest = light.abs().max_element();
         if largest > limit {
             light *= limit / largest;
         }
     }
-    if !(paper && st.mode == MODE_REAL) {
-        st.radiance += light;
+    if !(paper && st.path.mode == MODE_REAL) {
+        st.result.radiance += light;
     }
-    if paper && (st.mode == MODE_REAL || st.mode == MODE_SHARED) {
+    if paper && (st.path.mode == MODE_REAL || st.path.mode == MODE_SHARED) {
         st.radiance_real += light;
     }
 }

@@ -19,11 +19,15 @@ use crate::light::lights::env_arriving;
 use crate::material::{Surface, bsdf_albedo, surface_at};
 use crate::math::{hash_combine, hash_u32};
 use crate::packed::{
-    FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene,
+    ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, NONE,
+    PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene,
 };
+use crate::shared::shared;
 
-/// Sets the turns' offset apart from the sampler's streams, which hash the same numbers.
-const TURN_SALT: u32 = 0x7f4a_7c15;
+shared! {
+    /// Sets the turns' offset apart from the sampler's streams, which hash the same numbers.
+    const TURN_SALT: u32 = 0x7f4a_7c15;
+}
 
 /// The difference is evaluated in turns: at one sample in every `difference_period`, from a random offset of the pixel's own, so that each
 /// sample has the same chance. The number of the turn, or NONE if this sample has none.
@@ -61,14 +65,14 @@ pub fn samples_without_turn(scene: &PackedScene, pixel: u32, index: u32, end: u3
 
 /// Sets up the primary ray. `real_pass` renders the real radiance and the mask alone, for pixels that need Ir.
 pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool) -> PathState {
-    let mut st = PathState::new(pixel, index);
+    let mut st = path_state(pixel, index);
     let may_meet_virtual = scene.pixels[pixel as usize].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0;
     let direct = !real_pass && scene.frame.estimator != ESTIMATOR_PAPER;
     if direct && !may_meet_virtual {
         // The samples that have a turn are numbered by it, and so are spread over the pixel and the lens as a set of their own.
         let turn = difference_turn(scene, pixel, index);
         if turn != NONE {
-            st.index = turn;
+            st.path.index = turn;
         } else if scene.frame.flags & FRAME_AOVS == 0 {
             return st;
         }
@@ -86,22 +90,25 @@ pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool
         pose = camera_pose_at(&scene.frame, share);
     }
     let ray = camera_ray_from(&scene.frame, &pose, x, y, u[2], u[3]);
-    st.position = ray.origin;
-    st.direction = ray.direction;
+    st.ray.origin.position = ray.origin;
+    st.ray.direction = ray.direction;
+    if scene.frame.flags & FRAME_ALPHA != 0 {
+        st.ray.opacity_seed = hash_combine(hash_combine(scene.frame.seed, pixel), st.path.index);
+    }
     if real_pass {
-        st.stage = STAGE_REAL_PASS;
-        st.request = if may_meet_virtual {
+        st.path.stage = STAGE_REAL_PASS;
+        st.ray.request = if may_meet_virtual {
             REQUEST_CLOSEST_EACH
         } else {
             REQUEST_CLOSEST_REAL
         };
     } else if scene.frame.estimator == ESTIMATOR_PAPER {
-        st.mode = MODE_SHARED;
-        st.stage = STAGE_PATH;
-        st.request = REQUEST_CLOSEST_MIXED;
+        st.path.mode = MODE_SHARED;
+        st.path.stage = STAGE_PATH;
+        st.ray.request = REQUEST_CLOSEST_MIXED;
     } else if may_meet_virtual {
-        st.stage = STAGE_PRIMARY_VIRTUAL;
-        st.request = REQUEST_CLOSEST_VIRTUAL;
+        st.path.stage = STAGE_PRIMARY_VIRTUAL;
+        st.ray.request = REQUEST_CLOSEST_VIRTUAL;
     }
     st
 }
@@ -109,7 +116,7 @@ pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool
 /// Consumes the hits in `st` and either asks for the next ray or finishes the sample.
 pub fn advance(scene: &PackedScene, st: &mut PathState) {
     let mut goes_on = true;
-    match st.stage {
+    match st.path.stage {
         STAGE_PRIMARY_VIRTUAL => goes_on = primary_virtual(scene, st),
         STAGE_PRIMARY_REAL => primary_real(st),
         STAGE_PATH => goes_on = path_hit(scene, st),
@@ -127,101 +134,103 @@ pub fn advance(scene: &PackedScene, st: &mut PathState) {
 }
 
 /// True where the virtual hit covers the real one.
-fn virtual_is_nearer(hit_virtual: Hit, hit_real: Hit) -> bool {
-    hit_virtual.triangle != NONE && hit_virtual.t <= hit_real.t * (1.0 + COINCIDENCE)
+fn virtual_is_nearer(hits: &Hits) -> bool {
+    let Hits {
+        in_real,
+        in_virtual,
+    } = hits;
+    in_virtual.triangle != NONE
+        && (in_real.triangle == NONE || in_virtual.t <= in_real.t * (1.0 + COINCIDENCE))
 }
 
 /// Nothing virtual was met: the difference is evaluated if the sample has a turn, before the real ray is paid for.
 fn primary_missed_virtual(scene: &PackedScene, st: &mut PathState, has_turn: bool) {
-    let period = scene.pixels[st.pixel as usize].difference_period;
-    st.weight = if has_turn { period as f32 } else { 0.0 };
-    st.throughput = Vec3::splat(st.weight);
+    let period = scene.pixels[st.path.pixel as usize].difference_period;
+    st.path.weight = if has_turn { period as f32 } else { 0.0 };
+    st.path.throughput = Vec3::splat(st.path.weight);
     if has_turn || scene.frame.flags & FRAME_AOVS != 0 {
-        st.stage = STAGE_PRIMARY_REAL;
-        st.request = REQUEST_CLOSEST_REAL;
-        st.hit_virtual = MISS;
+        st.path.stage = STAGE_PRIMARY_REAL;
+        st.ray.request = REQUEST_CLOSEST_REAL;
     } else {
-        st.stage = STAGE_DONE;
+        st.path.stage = STAGE_DONE;
     }
 }
 
 /// False: the state already asks for its next ray, or is done.
 fn primary_virtual(scene: &PackedScene, st: &mut PathState) -> bool {
-    if st.hit_virtual.triangle == NONE {
-        let has_turn = difference_turn(scene, st.pixel, st.index) != NONE;
+    if st.hits.in_virtual.triangle == NONE {
+        let has_turn = difference_turn(scene, st.path.pixel, st.path.index) != NONE;
         primary_missed_virtual(scene, st, has_turn);
     } else {
-        st.stage = STAGE_PRIMARY_REAL;
-        st.request = REQUEST_CLOSEST_REAL;
-        st.t_max = st.hit_virtual.t;
+        st.path.stage = STAGE_PRIMARY_REAL;
+        st.ray.request = REQUEST_CLOSEST_REAL;
+        st.ray.t_max = st.hits.in_virtual.t;
     }
     false
 }
 
 fn primary_real(st: &mut PathState) {
-    st.depth = 1;
-    if virtual_is_nearer(st.hit_virtual, st.hit_real) {
-        st.mask = 1;
-        st.mode = MODE_MIXED;
-        plan_vertex(st, st.hit_virtual);
-    } else if st.hit_real.triangle != NONE {
+    st.ray.depth = 1;
+    if virtual_is_nearer(&st.hits) {
+        st.result.mask = 1;
+        st.path.mode = MODE_MIXED;
+        plan_vertex(st, st.hits.in_virtual);
+    } else if st.hits.in_real.triangle != NONE {
         // Without throughput the sample has no turn, and the vertex only fills the planes.
-        st.mode = MODE_DIFFERENCE;
-        plan_vertex(st, st.hit_real);
+        st.path.mode = MODE_DIFFERENCE;
+        plan_vertex(st, st.hits.in_real);
     }
 }
 
 fn plan_vertex(st: &mut PathState, hit: Hit) {
-    st.pending |= PENDING_VERTEX;
+    st.path.pending |= PENDING_VERTEX;
     st.vertex_hit = hit;
 }
 
 fn record_first_hit(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     let back = Vec3::from_slice(&scene.frame.camera_back[..3]);
     let camera = Vec3::from_slice(&scene.frame.camera_position[..3]);
-    st.depth_m = -(s.position - camera).dot(back);
-    st.normal = s.ns;
-    st.albedo = bsdf_albedo(s, -st.direction);
+    st.first_hit = FirstHit {
+        normal: s.ns,
+        depth_m: -(s.position - camera).dot(back),
+        albedo: bsdf_albedo(s, -st.ray.direction),
+        pad: 0,
+    };
 }
 
 /// Moves on to whatever is still pending; the sample ends when nothing is.
 fn resume(scene: &PackedScene, st: &mut PathState) {
     loop {
-        if st.pending & PENDING_VERTEX != 0 {
-            st.pending &= !PENDING_VERTEX;
-            let s = surface_at(scene, st.vertex_hit, st.direction);
-            if scene.frame.flags & FRAME_AOVS != 0 && st.depth == 1 && st.depth_m == f32::INFINITY {
+        if st.path.pending & PENDING_VERTEX != 0 {
+            st.path.pending &= !PENDING_VERTEX;
+            let s = surface_at(scene, st.vertex_hit, st.ray.direction);
+            if scene.frame.flags & FRAME_AOVS != 0
+                && st.ray.depth == 1
+                && st.first_hit.depth_m == f32::INFINITY
+            {
                 record_first_hit(scene, st, &s);
             }
             shade_vertex(scene, st, &s);
             continue;
         }
-        if st.pending & PENDING_SHADOW != 0 {
-            st.pending &= !PENDING_SHADOW;
-            st.request = st.shadow_request;
-            st.direction = st.shadow_direction;
-            st.t_max = st.shadow_t_max;
-            st.stage = if st.mode == MODE_DIFFERENCE {
+        if st.path.pending & PENDING_SHADOW != 0 {
+            st.path.pending &= !PENDING_SHADOW;
+            st.path.stage = if st.path.mode == MODE_DIFFERENCE {
                 STAGE_DIFFERENCE_SHADOW
             } else {
                 STAGE_PATH_SHADOW
             };
             return;
         }
-        if st.pending & PENDING_NEXT != 0 {
-            st.pending &= !PENDING_NEXT;
-            st.direction = st.next_direction;
-            st.density = st.next_density;
-            st.throughput = st.next_throughput;
-            st.medium = st.next_medium;
-            st.indirect = st.indirect || st.density != DELTA_DENSITY;
-            st.t_max = f32::INFINITY;
-            if st.mode == MODE_DIFFERENCE {
-                st.stage = STAGE_DIFFERENCE_CONE;
-                st.request = REQUEST_VIRTUAL_THEN_REAL;
+        if st.path.pending & PENDING_NEXT != 0 {
+            st.path.pending &= !PENDING_NEXT;
+            follow(st, st.next);
+            if st.path.mode == MODE_DIFFERENCE {
+                st.path.stage = STAGE_DIFFERENCE_CONE;
+                st.ray.request = REQUEST_VIRTUAL_THEN_REAL;
             } else {
-                st.stage = STAGE_PATH;
-                st.request = if st.mode == MODE_REAL {
+                st.path.stage = STAGE_PATH;
+                st.ray.request = if st.path.mode == MODE_REAL {
                     REQUEST_CLOSEST_REAL
                 } else {
                     REQUEST_CLOSEST_MIXED
@@ -229,66 +238,73 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             }
             return;
         }
-        if st.pending & PENDING_REAL != 0 {
-            st.pending &= !PENDING_REAL;
-            st.mode = MODE_REAL;
-            st.medium = st.real_medium;
-            st.depth = st.real_depth;
-            st.direction = st.real_direction;
-            st.density = st.real_density;
-            st.throughput = st.real_throughput;
-            st.indirect = st.indirect || st.density != DELTA_DENSITY;
-            plan_vertex(st, st.real_hit);
+        if st.path.pending & PENDING_REAL != 0 {
+            st.path.pending &= !PENDING_REAL;
+            st.path.mode = MODE_REAL;
+            follow(st, st.real.segment);
+            st.ray.depth = st.path.real_depth;
+            plan_vertex(st, st.real.hit);
             continue;
         }
-        if st.pending & PENDING_DIFFERENCE != 0 {
-            st.pending &= !PENDING_DIFFERENCE;
-            st.mode = MODE_DIFFERENCE;
-            st.medium = st.difference_medium;
-            st.position = st.difference_position;
-            st.offset = st.difference_offset;
-            st.coincidence_ratio = st.difference_coincidence_ratio;
-            st.side = 0;
-            st.real_t_min = st.difference_t_min;
-            st.direction = st.difference_direction;
-            st.density = st.difference_density;
-            st.throughput = st.difference_throughput;
-            st.indirect = true;
-            st.depth = st.difference_depth;
-            st.t_max = f32::INFINITY;
-            st.stage = STAGE_DIFFERENCE_BSDF;
-            st.request = if st.difference_left_to_cones {
-                REQUEST_REAL_UNLESS_COVERED
-            } else {
-                REQUEST_CLOSEST_EACH
-            };
+        if st.path.pending & PENDING_DIFFERENCE != 0 {
+            st.path.pending &= !PENDING_DIFFERENCE;
+            st.path.mode = MODE_DIFFERENCE;
+            follow(st, st.difference.segment);
+            st.path.indirect = 1;
+            st.ray.origin = st.difference.origin;
+            st.ray.side = 0;
+            st.ray.depth = st.difference.depth;
+            st.path.stage = STAGE_DIFFERENCE_BSDF;
+            st.ray.request = st.difference.request;
             return;
         }
-        st.stage = STAGE_DONE;
+        st.path.stage = STAGE_DONE;
         return;
+    }
+}
+
+/// Goes on along a segment, as far as it leads.
+fn follow(st: &mut PathState, segment: Segment) {
+    st.ray.direction = segment.direction;
+    st.ray.t_max = f32::INFINITY;
+    st.path.density = segment.density;
+    st.path.throughput = segment.throughput;
+    st.path.medium = segment.medium;
+    if segment.density != DELTA_DENSITY {
+        st.path.indirect = 1;
+    }
+}
+
+/// The segment being followed.
+fn followed(st: &PathState) -> Segment {
+    Segment {
+        direction: st.ray.direction,
+        density: st.path.density,
+        throughput: st.path.throughput,
+        medium: st.path.medium,
     }
 }
 
 /// The next vertex of a path, or its escape. False: the state already asks for its next ray.
 fn path_hit(scene: &PackedScene, st: &mut PathState) -> bool {
-    let virtual_first = st.mode != MODE_REAL && virtual_is_nearer(st.hit_virtual, st.hit_real);
+    let virtual_first = st.path.mode != MODE_REAL && virtual_is_nearer(&st.hits);
     let hit = if virtual_first {
-        st.hit_virtual
+        st.hits.in_virtual
     } else {
-        st.hit_real
+        st.hits.in_real
     };
-    st.depth += 1;
+    st.ray.depth += 1;
     if hit.triangle == NONE {
         path_escape(scene, st);
         return true;
     }
-    if st.mode == MODE_SHARED && virtual_first {
+    if st.path.mode == MODE_SHARED && virtual_first {
         // Rule 3 of the paper: a real ray continues in the same direction behind the virtual hit.
-        if st.depth == 1 {
-            st.mask = 1;
+        if st.ray.depth == 1 {
+            st.result.mask = 1;
         }
-        st.stage = STAGE_PAPER_BEHIND;
-        st.request = REQUEST_CLOSEST_REAL;
+        st.path.stage = STAGE_PAPER_BEHIND;
+        st.ray.request = REQUEST_CLOSEST_REAL;
         return false;
     }
     plan_vertex(st, hit);
@@ -296,25 +312,24 @@ fn path_hit(scene: &PackedScene, st: &mut PathState) -> bool {
 }
 
 fn paper_behind(scene: &PackedScene, st: &mut PathState) {
-    if st.hit_real.triangle != NONE {
-        st.pending |= PENDING_REAL;
-        st.real_hit = st.hit_real;
-        st.real_direction = st.direction;
-        st.real_density = st.density;
-        st.real_throughput = st.throughput;
-        st.real_medium = st.medium;
-        st.real_depth = st.depth;
+    if st.hits.in_real.triangle != NONE {
+        st.path.pending |= PENDING_REAL;
+        st.real = RealPath {
+            segment: followed(st),
+            hit: st.hits.in_real,
+        };
+        st.path.real_depth = st.ray.depth;
     } else {
-        st.mode = MODE_REAL;
+        st.path.mode = MODE_REAL;
         path_escape(scene, st);
     }
-    st.mode = MODE_MIXED;
-    plan_vertex(st, st.hit_virtual);
+    st.path.mode = MODE_MIXED;
+    plan_vertex(st, st.hits.in_virtual);
 }
 
 /// A path left the scene: the environment, weighted against the technique that samples it as a light.
 fn path_escape(scene: &PackedScene, st: &mut PathState) {
-    if st.depth == 1 && scene.frame.flags & FRAME_ENV_DRAWN == 0 {
+    if st.ray.depth == 1 && scene.frame.flags & FRAME_ENV_DRAWN == 0 {
         return;
     }
     let light = escaping_light(scene, st);
@@ -322,111 +337,114 @@ fn path_escape(scene: &PackedScene, st: &mut PathState) {
 }
 
 fn escaping_light(scene: &PackedScene, st: &PathState) -> Vec3 {
-    if st.density == DELTA_DENSITY {
-        return st.throughput * env_radiance(scene, st.direction);
+    if st.path.density == DELTA_DENSITY {
+        return st.path.throughput * env_radiance(scene, st.ray.direction);
     }
-    let (radiance, pdf) = env_arriving(scene, st.direction);
-    st.throughput * radiance * density_weight(st.density, pdf)
+    let (radiance, pdf) = env_arriving(scene, st.ray.direction);
+    st.path.throughput * radiance * density_weight(st.path.density, pdf)
 }
 
 fn path_shadow(scene: &PackedScene, st: &mut PathState) {
-    let open_virtual = st.hit_virtual.triangle == NONE;
-    let open_real = st.hit_real.triangle == NONE;
-    if st.mode == MODE_SHARED {
-        if st.shadow_request == REQUEST_SHADOW_PAIR {
-            // hit_real answers the real shadow ray, hit_virtual the mixed one.
+    let open_virtual = st.hits.in_virtual.triangle == NONE;
+    let open_real = st.hits.in_real.triangle == NONE;
+    let light = st.path.shadow_contribution;
+    if st.path.mode == MODE_SHARED {
+        if st.ray.request == REQUEST_SHADOW_PAIR {
+            // The real shadow ray's answer, and the mixed one's.
             if open_virtual {
-                st.radiance += st.shadow_contribution;
+                st.result.radiance += light;
             }
             if open_real {
-                st.radiance_real += st.shadow_contribution;
+                st.radiance_real += light;
             }
         } else if open_virtual && open_real {
-            st.radiance += st.shadow_contribution;
+            st.result.radiance += light;
         }
         return;
     }
     if open_virtual && open_real {
-        let light = st.shadow_contribution;
         accumulate(scene, st, light);
     }
 }
 
 /// A difference shadow ray contributes where only something virtual blocks a real light, or where nothing blocks a virtual one.
 fn difference_shadow(st: &mut PathState) {
-    let open_real = st.hit_real.triangle == NONE;
-    let open_virtual = st.hit_virtual.triangle == NONE;
-    let blocked_alone = st.shadow_request == REQUEST_SHADOW_DIFFERENCE;
+    let open_real = st.hits.in_real.triangle == NONE;
+    let open_virtual = st.hits.in_virtual.triangle == NONE;
+    let blocked_alone = st.ray.request == REQUEST_SHADOW_DIFFERENCE;
     if open_real && open_virtual != blocked_alone {
-        st.radiance += st.shadow_contribution;
+        st.result.radiance += st.path.shadow_contribution;
     }
 }
 
 /// A direction inside the cones counts only where virtual geometry is nearer.
 fn difference_cone(scene: &PackedScene, st: &mut PathState) {
-    if virtual_is_nearer(st.hit_virtual, st.hit_real) {
+    if virtual_is_nearer(&st.hits) {
         split_difference(scene, st);
     }
 }
 
 /// A direction drawn from the BSDF: the recursion where real geometry is nearer, the other half of (b) where virtual geometry is.
 fn difference_bsdf(scene: &PackedScene, st: &mut PathState) {
-    if virtual_is_nearer(st.hit_virtual, st.hit_real) {
-        if !st.difference_left_to_cones {
-            if st.density != DELTA_DENSITY {
+    if virtual_is_nearer(&st.hits) {
+        let left_to_cones = st.ray.request == REQUEST_REAL_UNLESS_COVERED;
+        if !left_to_cones {
+            if st.path.density != DELTA_DENSITY {
                 // The cones could have drawn it too: the balance heuristic divides by the sum.
-                let total = st.density + vertex_cone_density(scene, st);
-                st.throughput *= st.density / total;
-                st.density = total;
+                let total = st.path.density + vertex_cone_density(scene, st);
+                st.path.throughput *= st.path.density / total;
+                st.path.density = total;
             }
             split_difference(scene, st);
         }
-    } else if st.hit_real.triangle != NONE && st.depth < scene.frame.max_bounces {
-        st.depth += 1;
-        plan_vertex(st, st.hit_real);
+    } else if st.hits.in_real.triangle != NONE && st.ray.depth < scene.frame.max_bounces {
+        st.ray.depth += 1;
+        plan_vertex(st, st.hits.in_real);
     }
 }
 
 /// Effective density of the cone technique at the vertex that the present ray leaves.
 fn vertex_cone_density(scene: &PackedScene, st: &PathState) -> f32 {
-    if st.difference_cone_probability == 0.0 {
+    let probability = st.difference.cone_probability;
+    if probability == 0.0 {
         return 0.0;
     }
-    st.difference_cone_probability
+    probability
         * cone_pdf(
-            &Cones::at(&scene.frame, st.position, st.difference_normal),
-            st.direction,
+            &Cones::at(&scene.frame, st.ray.origin.position, st.difference.normal),
+            st.ray.direction,
         )
 }
 
 /// Virtual geometry is nearer: its radiance counts, and what the real world shows behind it is taken away.
 fn split_difference(scene: &PackedScene, st: &mut PathState) {
-    if st.hit_real.triangle == NONE {
-        st.radiance -= escaping_light(scene, st);
+    if st.hits.in_real.triangle == NONE {
+        st.result.radiance -= escaping_light(scene, st);
     } else {
-        st.pending |= PENDING_REAL;
-        st.real_hit = st.hit_real;
-        st.real_direction = st.direction;
-        st.real_density = st.density;
-        st.real_throughput = -st.throughput;
-        st.real_medium = st.medium;
-        st.real_depth = st.depth + 1;
+        st.path.pending |= PENDING_REAL;
+        let mut segment = followed(st);
+        segment.throughput = -segment.throughput;
+        st.real = RealPath {
+            segment,
+            hit: st.hits.in_real,
+        };
+        st.path.real_depth = st.ray.depth + 1;
     }
-    st.mode = MODE_MIXED;
-    st.depth += 1;
-    plan_vertex(st, st.hit_virtual);
+    st.path.mode = MODE_MIXED;
+    st.ray.depth += 1;
+    plan_vertex(st, st.hits.in_virtual);
 }
 
 /// Real pass: the real radiance along the primary ray, and whether something virtual covers it.
 fn real_pass(scene: &PackedScene, st: &mut PathState) {
-    if virtual_is_nearer(st.hit_virtual, st.hit_real) {
-        st.mask = 1;
+    if virtual_is_nearer(&st.hits) {
+        st.result.mask = 1;
     }
-    st.mode = MODE_REAL;
-    st.depth = 1;
-    if st.hit_real.triangle == NONE {
+    st.path.mode = MODE_REAL;
+    st.ray.depth = 1;
+    if st.hits.in_real.triangle == NONE {
         path_escape(scene, st);
     } else {
-        plan_vertex(st, st.hit_real);
+        plan_vertex(st, st.hits.in_real);
     }
 }

@@ -7,7 +7,6 @@ pub mod render;
 pub mod request;
 pub mod state;
 mod surfaces;
-
 pub mod vertex;
 
 pub use pilot::pilot;

@@ -3,12 +3,11 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::contribution::ESTIMATOR_PAPER;
 use super::estimator::{advance, begin_sample, samples_without_turn};
 use super::request::answer;
 use super::state::{PathState, STAGE_DONE};
-use crate::film::{Film, Guide, GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
-use crate::packed::PackedScene;
+use crate::film::{Film, GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
+use crate::packed::{ESTIMATOR_PAPER, PackedScene};
 use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
 
 /// Pixels a task renders before it looks for cancellation.
@@ -101,8 +100,8 @@ impl Tile<'_> {
         let sums = &mut self.sums[work.pixel as usize - self.first_pixel];
         for index in work.first..work.end {
             let st = run(scene, begin_sample(scene, work.pixel, index, true), rays);
-            let real = st.radiance * scene.frame.exposure_scale;
-            pixel_add_real(sums, index, st.mask != 0, real);
+            let real = st.result.radiance * scene.frame.exposure_scale;
+            pixel_add_real(sums, index, st.result.mask != 0, real);
         }
     }
 }
@@ -117,19 +116,19 @@ fn main_sample(
 ) {
     let st = run(scene, begin_sample(scene, pixel, index, false), rays);
     let scale = scene.frame.exposure_scale;
-    let is_virtual = st.mask != 0;
+    let is_virtual = st.result.mask != 0;
     let (contribution, real) = if scene.frame.estimator == ESTIMATOR_PAPER {
         let real = st.radiance_real * scale;
         (
             if is_virtual {
-                st.radiance * scale
+                st.result.radiance * scale
             } else {
-                (st.radiance - st.radiance_real) * scale
+                (st.result.radiance - st.radiance_real) * scale
             },
             Some(real),
         )
     } else {
-        (st.radiance * scale, None)
+        (st.result.radiance * scale, None)
     };
     sums.add(
         index,
@@ -137,23 +136,18 @@ fn main_sample(
             is_virtual,
             contribution,
             real,
-            guide: None,
         },
     );
+    let hit = &st.first_hit;
     if let Some(sums) = guide
-        && st.depth_m.is_finite()
+        && hit.depth_m.is_finite()
     {
-        let guide = Guide {
-            depth_m: st.depth_m,
-            normal: st.normal,
-            albedo: st.albedo,
-        };
-        guide_add(sums, guide.depth_m, guide.normal, guide.albedo);
+        guide_add(sums, hit.depth_m, hit.normal, hit.albedo);
     }
 }
 
 fn run(scene: &PackedScene, mut st: PathState, rays: &mut RayCounts) -> PathState {
-    while st.stage != STAGE_DONE {
+    while st.path.stage != STAGE_DONE {
         answer(scene, &mut st);
         advance(scene, &mut st);
     }
@@ -168,5 +162,89 @@ pub fn render_first_hit(scene: &PackedScene, pixel: u32, index: u32) -> (Vec3, V
         begin_sample(scene, pixel, index, true),
         &mut RayCounts::default(),
     );
-    (st.radiance, st.albedo)
+    (st.result.radiance, st.first_hit.albedo)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    use super::*;
+    use crate::packed::{PixelInfo, test_mesh, test_scene};
+    use crate::scene::{Environment, EnvironmentMap, Material, Side};
+
+    /// A square before half of a bright sky, six tiles.
+    fn scene() -> PackedScene {
+        let mut scene = test_scene();
+        let camera = &mut scene.camera;
+        (camera.width, camera.height) = (64, 48);
+        (camera.fx, camera.fy, camera.cx, camera.cy) = (64.0, 64.0, 32.0, 24.0);
+        let corners = [
+            [0.0, -1.0, -1.0],
+            [1.0, -1.0, -1.0],
+            [1.0, 1.0, -1.0],
+            [0.0, 1.0, -1.0],
+        ];
+        let triangles = [[0, 1, 2], [0, 2, 3]];
+        scene.objects = vec![test_mesh(
+            Side::Virtual,
+            &corners,
+            &triangles,
+            Material::default(),
+        )];
+        scene.environment = Some(Environment {
+            map: EnvironmentMap::Constant([1.0; 3]),
+            rotation_deg: 0.0,
+            scale: 1.0,
+        });
+        let mut packed = PackedScene::build(&scene).expect("packs");
+        packed.pixels =
+            vec![PixelInfo::uniform(crate::packed::PIXEL_BEAM_MAY_MEET_VIRTUAL); 64 * 48];
+        packed
+    }
+
+    #[test]
+    fn a_cancelled_render_leaves_whole_pixels_and_what_is_left_completes_it() {
+        let scene = scene();
+        for with_guides in [false, true] {
+            let empty = Film::new(64, 48, 0, with_guides);
+            let work = WorkList::main(&scene.pixels, &empty, |row| 1 + row as u32 % 3);
+            let mut whole = empty.clone();
+            let rays = render(&scene, &mut whole, &work, &Watcher::none());
+
+            let mut film = empty.clone();
+            let asked = AtomicU32::new(0);
+            let after_two_tiles = || asked.fetch_add(1, Ordering::Relaxed) > 1;
+            let watcher = Watcher::none().cancelled_by(&after_two_tiles);
+            let mut again = render(&scene, &mut film, &work, &watcher);
+            for work in &work.pixels {
+                let n = film.pixels[work.pixel as usize].n;
+                assert!(n == 0 || n == work.samples());
+            }
+            let left = work.left(&film);
+            assert_eq!(left.pixels.len(), work.pixels.len() - 2 * TILE_PIXELS);
+            assert!(film != whole, "control: it was cancelled");
+            again += render(&scene, &mut film, &left, &Watcher::none());
+            assert!(film == whole && again == rays);
+            assert!(work.left(&film).is_empty());
+        }
+    }
+
+    #[test]
+    fn real_samples_follow_in_any_portions() {
+        let scene = scene();
+        let mut film = Film::new(64, 48, 0, false);
+        let main = WorkList::main(&scene.pixels, &film, |_| 8);
+        render(&scene, &mut film, &main, &Watcher::none());
+        let mut whole = film.clone();
+        let real = |film: &Film, end| WorkList::real(&scene.pixels, film, true, |_| end);
+        let all = real(&film, 8);
+        render(&scene, &mut whole, &all, &Watcher::none());
+        for end in [3, 8] {
+            assert!(film != whole, "control: something is missing");
+            let part = real(&film, end);
+            render(&scene, &mut film, &part, &Watcher::none());
+        }
+        assert!(film == whole);
+    }
 }

@@ -7,88 +7,211 @@ use crate::math::{hash_combine, length3, uniform_from_bits};
 use crate::packed::{
     FRAME_ALPHA, FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, NONE, PackedScene,
 };
+use crate::shared::shared;
 
-/// A ray that meets this many transparent layers ends at the last.
-const MAX_ALPHA_LAYERS: u32 = 64;
+shared! {
+    /// A ray that meets this many transparent layers ends at the last.
+    const MAX_ALPHA_LAYERS: u32 = 64;
 
-pub const WORLD_REAL: u32 = 0;
-pub const WORLD_VIRTUAL: u32 = 1;
+    pub const WORLD_REAL: u32 = 0;
+    pub const WORLD_VIRTUAL: u32 = 1;
+    /// The request is answered.
+    const QUERY_NONE: u32 = 2;
+    /// A length below it is none.
+    const MIN_POSITIVE: f32 = f32::MIN_POSITIVE;
+}
 
-/// Traces what `st.request` asks for and leaves the answer in `st.hit_real` and `st.hit_virtual`.
-pub fn answer(scene: &PackedScene, st: &mut PathState) {
-    let mut hit_real = MISS;
-    let mut hit_virtual = MISS;
-    let t_max = st.t_max;
-    match st.request {
-        REQUEST_CLOSEST_VIRTUAL => {
-            st.rays.mixed += 1;
-            hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, t_max, false);
+/// One query of a request: a world and how far.
+struct Query {
+    world: u32,
+    any_hit: bool,
+    t_max: f32,
+    /// The answer goes to the real world's hit rather than the virtual one's.
+    to_real: bool,
+}
+
+fn query(world: u32, any_hit: bool, t_max: f32) -> Query {
+    Query {
+        world,
+        any_hit,
+        t_max,
+        to_real: world == WORLD_REAL,
+    }
+}
+
+/// The request as a sequence of at most three queries; `hits`: what the earlier ones met.
+#[inline]
+fn next_query(scene: &PackedScene, request: u32, step: u32, t_max: f32, hits: &Hits) -> Query {
+    let met_real = hits.in_real.triangle != NONE;
+    let met_virtual = hits.in_virtual.triangle != NONE;
+    match (request, step) {
+        (REQUEST_CLOSEST_VIRTUAL, 0) => query(WORLD_VIRTUAL, false, t_max),
+        (REQUEST_CLOSEST_REAL, 0) => query(WORLD_REAL, false, t_max),
+        (REQUEST_CLOSEST_MIXED, 0) => query(WORLD_VIRTUAL, false, t_max),
+        (REQUEST_CLOSEST_MIXED, 1) => query(WORLD_REAL, false, hits.in_virtual.t),
+        (REQUEST_CLOSEST_EACH, 0) => query(WORLD_VIRTUAL, false, t_max),
+        (REQUEST_CLOSEST_EACH, 1) => query(WORLD_REAL, false, t_max),
+        (REQUEST_VIRTUAL_THEN_REAL, 0) => query(WORLD_VIRTUAL, false, t_max),
+        (REQUEST_VIRTUAL_THEN_REAL, 1) if met_virtual => query(WORLD_REAL, false, t_max),
+        (REQUEST_REAL_UNLESS_COVERED, 0) => query(WORLD_REAL, false, t_max),
+        (REQUEST_REAL_UNLESS_COVERED, 1) if met_real => {
+            query(WORLD_VIRTUAL, true, hits.in_real.t * (1.0 + COINCIDENCE))
         }
-        REQUEST_CLOSEST_REAL => {
-            st.rays.real += 1;
-            hit_real = trace_world(scene, st, WORLD_REAL, t_max, false);
-            // The primary real ray answers beside the virtual hit found before.
-            hit_virtual = st.hit_virtual;
+        (REQUEST_SHADOW_MIXED, 0) => query(WORLD_VIRTUAL, true, t_max),
+        (REQUEST_SHADOW_MIXED, 1) if !met_virtual => query(WORLD_REAL, true, t_max),
+        (REQUEST_SHADOW_REAL, 0) => query(WORLD_REAL, true, t_max),
+        (REQUEST_SHADOW_DIFFERENCE, 0) => query(WORLD_VIRTUAL, true, t_max),
+        (REQUEST_SHADOW_DIFFERENCE, 1) if met_virtual || asks_both(scene) => {
+            query(WORLD_REAL, true, t_max)
         }
-        REQUEST_CLOSEST_MIXED => {
-            st.rays.mixed += 1;
-            hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, t_max, false);
-            hit_real = trace_world(scene, st, WORLD_REAL, hit_virtual.t, false);
-        }
-        REQUEST_CLOSEST_EACH => {
-            st.rays.mixed += 1;
-            hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, t_max, false);
-            hit_real = trace_world(scene, st, WORLD_REAL, t_max, false);
-        }
+        (REQUEST_SHADOW_PAIR, 0) => query(WORLD_REAL, true, t_max),
+        (REQUEST_SHADOW_PAIR, 1) => query(WORLD_VIRTUAL, true, t_max),
+        (REQUEST_SHADOW_PAIR, 2) if !met_virtual => Query {
+            to_real: false,
+            ..query(WORLD_REAL, true, t_max)
+        },
+        _ => query(QUERY_NONE, false, 0.0),
+    }
+}
+
+fn asks_both(scene: &PackedScene) -> bool {
+    scene.frame.flags & FRAME_BOTH_SHADOWS != 0
+}
+
+/// Counts the rays of the request, once it is answered, by the paper's kinds.
+fn count_rays(scene: &PackedScene, st: &mut PathState) {
+    let met_real = st.hits.in_real.triangle != NONE;
+    let met_virtual = st.hits.in_virtual.triangle != NONE;
+    let rays = &mut st.rays;
+    match st.ray.request {
+        REQUEST_CLOSEST_VIRTUAL | REQUEST_CLOSEST_MIXED | REQUEST_CLOSEST_EACH => rays.mixed += 1,
+        REQUEST_CLOSEST_REAL => rays.real += 1,
         REQUEST_VIRTUAL_THEN_REAL => {
-            st.rays.mixed += 1;
-            hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, t_max, false);
-            if hit_virtual.triangle != NONE {
-                st.rays.real += 1;
-                hit_real = trace_world(scene, st, WORLD_REAL, t_max, false);
-            }
+            rays.mixed += 1;
+            rays.real += u32::from(met_virtual);
         }
         REQUEST_REAL_UNLESS_COVERED => {
-            st.rays.real += 1;
-            hit_real = trace_world(scene, st, WORLD_REAL, t_max, false);
-            if hit_real.triangle != NONE {
-                st.rays.mixed += 1;
-                let covering = hit_real.t * (1.0 + COINCIDENCE);
-                hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, covering, true);
-            }
+            rays.real += 1;
+            rays.mixed += u32::from(met_real);
         }
-        REQUEST_SHADOW_MIXED => {
-            st.rays.mixed_shadow += 1;
-            hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, t_max, true);
-            if hit_virtual.triangle == NONE {
-                hit_real = trace_world(scene, st, WORLD_REAL, t_max, true);
-            }
-        }
-        REQUEST_SHADOW_REAL => {
-            st.rays.real_shadow += 1;
-            hit_real = trace_world(scene, st, WORLD_REAL, t_max, true);
-        }
+        REQUEST_SHADOW_MIXED => rays.mixed_shadow += 1,
+        REQUEST_SHADOW_REAL => rays.real_shadow += 1,
         REQUEST_SHADOW_DIFFERENCE => {
-            st.rays.mixed_shadow += 1;
-            hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, t_max, true);
-            if hit_virtual.triangle != NONE || scene.frame.flags & FRAME_BOTH_SHADOWS != 0 {
-                st.rays.real_shadow += 1;
-                hit_real = trace_world(scene, st, WORLD_REAL, t_max, true);
-            }
+            rays.mixed_shadow += 1;
+            rays.real_shadow += u32::from(met_virtual || asks_both(scene));
         }
         REQUEST_SHADOW_PAIR => {
-            st.rays.real_shadow += 1;
-            st.rays.mixed_shadow += 1;
-            hit_real = trace_world(scene, st, WORLD_REAL, t_max, true);
-            hit_virtual = trace_world(scene, st, WORLD_VIRTUAL, t_max, true);
-            if hit_virtual.triangle == NONE {
-                hit_virtual = trace_world(scene, st, WORLD_REAL, t_max, true);
-            }
+            rays.real_shadow += 1;
+            rays.mixed_shadow += 1;
         }
         _ => {}
     }
-    st.hit_real = hit_real;
-    st.hit_virtual = hit_virtual;
+}
+
+/// Traces what the state asks for and leaves the answer in its hits.
+pub fn answer(scene: &PackedScene, st: &mut PathState) {
+    let request = st.ray.request;
+    let alpha = scene.frame.flags & FRAME_ALPHA != 0;
+    let mut hits = Hits {
+        in_real: MISS,
+        in_virtual: MISS,
+    };
+    let mut step = 0;
+    let mut layer = 0;
+    let mut t_min = -1.0;
+    let mut skip = NONE;
+    // Transparent layers repeat a query from where it stopped.
+    loop {
+        let q = next_query(scene, request, step, st.ray.t_max, &hits);
+        if q.world == QUERY_NONE {
+            break;
+        }
+        let mut ray = ray_into(&st.ray, q.world, q.t_max);
+        if layer > 0 {
+            ray.t_min = t_min;
+            ray.skip = skip;
+        }
+        let mut hit = trace(scene, &ray, q.world, q.any_hit && !alpha);
+        if alpha {
+            if hit.triangle != NONE && layer + 1 < MAX_ALPHA_LAYERS && !meets(scene, &st.ray, hit) {
+                t_min = hit.t;
+                skip = hit.triangle;
+                layer += 1;
+                continue;
+            }
+            layer = 0;
+        }
+        if q.any_hit && hit.triangle != NONE {
+            // Only that something was met means anything.
+            hit.t = 0.0;
+        }
+        if q.to_real {
+            hits.in_real = hit;
+        } else {
+            hits.in_virtual = hit;
+        }
+        step += 1;
+    }
+    if request == REQUEST_CLOSEST_REAL {
+        // It answers beside the virtual hit found before.
+        hits.in_virtual = st.hits.in_virtual;
+    }
+    st.hits = hits;
+    count_rays(scene, st);
+}
+
+/// One world's nearest hit, or any: then only whether there is one means anything.
+#[inline]
+fn trace(scene: &PackedScene, ray: &Ray, world: u32, any_hit: bool) -> Hit {
+    let bvh = if world == WORLD_REAL {
+        &scene.real_bvh
+    } else {
+        &scene.virtual_bvh
+    };
+    if !any_hit {
+        return bvh.closest(ray);
+    }
+    Hit {
+        triangle: if bvh.any(ray) { 0 } else { NONE },
+        ..MISS
+    }
+}
+
+/// The ray in one world. A ray that leaves a surface starts past it in that surface's own world, so that it does not meet itself. In the other
+/// world it starts as if virtual geometry lay in front of real geometry that coincides with it, as seen from where the path came: a ray
+/// that goes on through a virtual surface then meets the real one, and one that goes back meets it not. A shadow ray ends at the same point
+/// wherever it starts, short of its light: the light must not hide itself.
+fn ray_into(ray: &PathRay, world: u32, t_max: f32) -> Ray {
+    let offset = ray.origin.offset;
+    let shift = if world == ray.side {
+        if ray.direction.dot(offset) < 0.0 {
+            -offset
+        } else {
+            offset
+        }
+    } else if world == WORLD_REAL {
+        offset * ray.origin.coincidence_ratio
+    } else {
+        -offset * ray.origin.coincidence_ratio
+    };
+    let mut direction = ray.direction;
+    let mut distance = t_max;
+    if is_shadow(ray.request) && t_max < f32::INFINITY {
+        let to_end = ray.direction * t_max - shift;
+        distance = length3(to_end);
+        direction = to_end / distance.max(MIN_POSITIVE);
+    }
+    Ray {
+        origin: ray.origin.position + shift,
+        direction,
+        t_min: if world == WORLD_REAL {
+            ray.origin.real_t_min
+        } else {
+            0.0
+        },
+        t_max: distance,
+        skip: NONE,
+    }
 }
 
 fn is_shadow(request: u32) -> bool {
@@ -101,84 +224,13 @@ fn is_shadow(request: u32) -> bool {
     )
 }
 
-/// What an any-hit query that met something answers: only `triangle != NONE` means anything.
-const BLOCKED: Hit = Hit {
-    t: 0.0,
-    u: 0.0,
-    v: 0.0,
-    triangle: 0,
-};
-
-/// One world's answer. A ray that leaves a surface starts past it in that surface's own world, so that it does not meet itself. In the other
-/// world it starts as if virtual geometry lay in front of real geometry that coincides with it, as seen from where the path came: a ray
-/// that goes on through a virtual surface then meets the real one, and one that goes back meets it not. A shadow ray ends at the same point
-/// wherever it starts, short of its light: the light must not hide itself.
-fn trace_world(scene: &PackedScene, st: &PathState, world: u32, t_max: f32, any_hit: bool) -> Hit {
-    let shift = if world == st.side {
-        if st.direction.dot(st.offset) < 0.0 {
-            -st.offset
-        } else {
-            st.offset
-        }
-    } else if world == WORLD_REAL {
-        st.offset * st.coincidence_ratio
-    } else {
-        -st.offset * st.coincidence_ratio
-    };
-    let mut direction = st.direction;
-    let mut t_max = t_max;
-    if is_shadow(st.request) && t_max < f32::INFINITY {
-        let to_end = st.direction * t_max - shift;
-        t_max = length3(to_end);
-        direction = to_end / t_max.max(f32::MIN_POSITIVE);
-    }
-    let mut ray = Ray {
-        origin: st.position + shift,
-        direction,
-        t_min: if world == WORLD_REAL {
-            st.real_t_min
-        } else {
-            0.0
-        },
-        t_max,
-        skip: NONE,
-    };
-    let bvh = if world == WORLD_REAL {
-        &scene.real_bvh
-    } else {
-        &scene.virtual_bvh
-    };
-    if scene.frame.flags & FRAME_ALPHA == 0 {
-        if any_hit {
-            return if bvh.any(&ray) { BLOCKED } else { MISS };
-        }
-        return bvh.closest(&ray);
-    }
-    let mut hit = MISS;
-    for _ in 0..MAX_ALPHA_LAYERS {
-        hit = bvh.closest(&ray);
-        if hit.triangle == NONE || meets(scene, st, hit) {
-            return hit;
-        }
-        ray.t_min = hit.t;
-        ray.skip = hit.triangle;
-    }
-    hit
-}
-
 /// Whether the ray meets a surface of partial opacity: with the probability of its opacity.
-fn meets(scene: &PackedScene, st: &PathState, hit: Hit) -> bool {
+fn meets(scene: &PackedScene, ray: &PathRay, hit: Hit) -> bool {
     let material = &scene.materials[scene.triangles[hit.triangle as usize].material as usize];
     if material.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) == 0 {
         return true;
     }
     let alpha = surface_alpha(scene, hit);
-    let bits = hash_combine(
-        hash_combine(
-            hash_combine(hash_combine(scene.frame.seed, st.pixel), st.index),
-            hit.triangle,
-        ),
-        st.depth,
-    );
+    let bits = hash_combine(hash_combine(ray.opacity_seed, hit.triangle), ray.depth);
     uniform_from_bits(bits) < alpha
 }

@@ -15,26 +15,30 @@ use crate::material::{
 };
 use crate::math::{dot3, exp_, safe_sqrt};
 use crate::packed::{
-    FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX,
-    MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE, PackedScene,
+    ESTIMATOR_PAPER, FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES,
+    FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE,
+    PackedScene,
 };
+use crate::shared::shared;
 
-/// Paths shorter than this are never ended by roulette.
-const ROULETTE_FROM_DEPTH: u32 = 2;
-/// A continuation is followed for certain while its largest channel times this is at least 1.
-const ROULETTE_GAIN: f32 = 4.0;
-/// The cones and the recursion are followed for certain where their expected contribution times this is at least 1, and never with less
-/// than the floor's probability.
-const CONE_ROULETTE_GAIN: f32 = 8.0;
-const CONE_ROULETTE_FLOOR: f32 = 0.1;
-const RECURSION_ROULETTE_GAIN: f32 = 1.0;
-const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
-/// A light's own surface must not block it: shadow rays end this much short of it, relative to the distance and in position errors.
-const SHADOW_SHORTEN: f32 = 2e-5;
-const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
+shared! {
+    /// Paths shorter than this are never ended by roulette.
+    const ROULETTE_FROM_DEPTH: u32 = 2;
+    /// A continuation is followed for certain while its largest channel times this is at least 1.
+    const ROULETTE_GAIN: f32 = 4.0;
+    /// The cones and the recursion are followed for certain where their expected contribution times this is at least 1, and never with less
+    /// than the floor's probability.
+    const CONE_ROULETTE_GAIN: f32 = 8.0;
+    const CONE_ROULETTE_FLOOR: f32 = 0.1;
+    const RECURSION_ROULETTE_GAIN: f32 = 1.0;
+    const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
+    /// A light's own surface must not block it: shadow rays end this much short of it, relative to the distance and in position errors.
+    const SHADOW_SHORTEN: f32 = 2e-5;
+    const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
-/// Surfaces that scatter nothing.
-const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
+    /// Surfaces that scatter nothing.
+    const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
+}
 
 /// What the techniques of a difference vertex share.
 struct Techniques {
@@ -44,15 +48,19 @@ struct Techniques {
     bsdf_probability: f32,
 }
 
+fn is_difference(st: &PathState) -> bool {
+    st.path.mode == MODE_DIFFERENCE
+}
+
 /// Adds the emission at the vertex and plans its shadow ray and continuations. A difference vertex (mode `MODE_DIFFERENCE`) does not emit,
 /// for both worlds see it; its throughput multiplies the difference there.
 pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
-    let difference = st.mode == MODE_DIFFERENCE;
-    let wo = -st.direction;
+    let difference = is_difference(st);
+    let wo = -st.ray.direction;
     let distance = st.vertex_hit.t;
-    if st.medium != NONE {
-        let sigma = scene.materials[st.medium as usize].sigma_a;
-        st.throughput *= Vec3::new(
+    if st.path.medium != NONE {
+        let sigma = scene.materials[st.path.medium as usize].sigma_a;
+        st.path.throughput *= Vec3::new(
             exp_(-sigma[0] * distance),
             exp_(-sigma[1] * distance),
             exp_(-sigma[2] * distance),
@@ -61,28 +69,26 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     if !difference {
         add_emission(scene, st, s, distance);
     }
-    if st.depth > scene.frame.max_bounces
+    if st.ray.depth > scene.frame.max_bounces
         || s.flags & EMITS_ONLY != 0
-        || st.throughput == Vec3::ZERO
+        || st.path.throughput == Vec3::ZERO
     {
         return;
     }
-    let side = if st.vertex_hit.triangle >= scene.frame.real_triangle_count {
-        1
-    } else {
-        0
-    };
-    let leaves_coinciding_real = side == 1 && st.side == 0 && coincides(st, s, distance);
+    let side = u32::from(st.vertex_hit.triangle >= scene.frame.real_triangle_count);
+    let leaves_coinciding_real = side == 1 && st.ray.side == 0 && coincides(st, s, distance);
     let reach = 1.0 + COINCIDENCE * distance / s.error;
-    st.coincidence_ratio = if leaves_coinciding_real {
-        -reach
-    } else {
-        reach
+    st.ray.origin = RayOrigin {
+        position: s.position,
+        real_t_min: scene.materials[s.material as usize].self_shadow_bias,
+        offset: s.ng * s.error,
+        coincidence_ratio: if leaves_coinciding_real {
+            -reach
+        } else {
+            reach
+        },
     };
-    st.position = s.position;
-    st.offset = s.ng * s.error;
-    st.side = side;
-    st.real_t_min = scene.materials[s.material as usize].self_shadow_bias;
+    st.ray.side = side;
 
     let techniques = difference.then(|| techniques_at(scene, st, s, wo));
     next_event(scene, st, s, wo, techniques.as_ref());
@@ -98,7 +104,7 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
 /// Whether the light drawn at the vertex is all the light there is to find: past the last vertex a path finds only emitters. (`paper` traces
 /// the rays of its rules all the same.)
 fn lights_suffice(scene: &PackedScene, st: &PathState, s: &Surface) -> bool {
-    st.depth >= scene.frame.max_bounces
+    st.ray.depth >= scene.frame.max_bounces
         && scene.frame.flags & (FRAME_LIGHTS_SUFFICE | FRAME_NO_LAST_VERTEX) == FRAME_LIGHTS_SUFFICE
         && scene.frame.estimator != ESTIMATOR_PAPER
         && bsdf_is_lambertian(s)
@@ -118,7 +124,9 @@ fn techniques_at(scene: &PackedScene, st: &PathState, s: &Surface, wo: Vec3) -> 
         };
     }
     let cones = Cones::at(&scene.frame, s.position, s.ns);
-    let strength = (st.throughput * bsdf_albedo(s, wo)).abs().max_element();
+    let strength = (st.path.throughput * bsdf_albedo(s, wo))
+        .abs()
+        .max_element();
     let reach = cone_solid_angle_fraction(&cones);
     let cone_probability = (CONE_ROULETTE_GAIN * strength * reach).clamp(CONE_ROULETTE_FLOOR, 1.0);
     let mut bsdf_probability = 1.0;
@@ -135,9 +143,11 @@ fn techniques_at(scene: &PackedScene, st: &PathState, s: &Surface, wo: Vec3) -> 
 
 /// Whether the surface reached lies in the plane of the one that the ray has left, as far as their errors tell.
 fn coincides(st: &PathState, s: &Surface, distance: f32) -> bool {
-    let error2 = dot3(st.offset, st.offset);
-    let errors = 2.0 * (error2 * (1.0 + st.coincidence_ratio) + safe_sqrt(error2) * s.error);
-    dot3(st.direction, st.offset).abs() * distance <= errors
+    let offset = st.ray.origin.offset;
+    let error2 = dot3(offset, offset);
+    let ratio = st.ray.origin.coincidence_ratio;
+    let errors = 2.0 * (error2 * (1.0 + ratio) + safe_sqrt(error2) * s.error);
+    dot3(st.ray.direction, offset).abs() * distance <= errors
 }
 
 fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: f32) {
@@ -145,19 +155,13 @@ fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: 
         return;
     }
     let mut weight = 1.0;
-    if s.light != NONE && st.density != DELTA_DENSITY {
-        weight = density_weight(
-            st.density,
-            light_pdf_hit(
-                scene,
-                s.light,
-                s.position - st.direction * distance,
-                st.direction,
-                distance,
-            ),
-        );
+    if s.light != NONE && st.path.density != DELTA_DENSITY {
+        let direction = st.ray.direction;
+        let from_position = s.position - direction * distance;
+        let pdf = light_pdf_hit(scene, s.light, from_position, direction, distance);
+        weight = density_weight(st.path.density, pdf);
     }
-    let light = st.throughput * s.emission * weight;
+    let light = st.path.throughput * s.emission * weight;
     accumulate(scene, st, light);
 }
 
@@ -173,7 +177,7 @@ fn next_event(
     if scene.frame.light_count == 0 || bsdf_is_delta(s) {
         return;
     }
-    let difference = st.mode == MODE_DIFFERENCE;
+    let difference = is_difference(st);
     let set = if difference {
         SET_DIFFERENCE_LIGHT
     } else {
@@ -194,8 +198,7 @@ fn next_event(
     let l = light_sample(scene, index, s.position, u.pair());
     let contribution = light_contribution(scene, st, s, wo, techniques, &l);
     if contribution != Vec3::ZERO {
-        st.shadow_contribution = contribution;
-        plan_shadow(st, s, &l);
+        plan_shadow(st, s, &l, contribution);
     }
 }
 
@@ -208,9 +211,9 @@ fn light_contribution(
     techniques: Option<&Techniques>,
     l: &LightSample,
 ) -> Vec3 {
-    let difference = st.mode == MODE_DIFFERENCE;
+    let difference = is_difference(st);
     let real_light = l.side == 0;
-    if l.pdf <= 0.0 || (st.mode == MODE_REAL && !real_light) {
+    if l.pdf <= 0.0 || (st.path.mode == MODE_REAL && !real_light) {
         return Vec3::ZERO;
     }
     if difference
@@ -236,24 +239,26 @@ fn light_contribution(
         weight = density_weight(l.pdf, other);
     }
     let sign = if difference && real_light { -1.0 } else { 1.0 };
-    st.throughput * f.f_cos * l.radiance * (sign * weight / l.pdf)
+    st.path.throughput * f.f_cos * l.radiance * (sign * weight / l.pdf)
 }
 
-fn plan_shadow(st: &mut PathState, s: &Surface, l: &LightSample) {
-    st.shadow_direction = l.direction;
-    st.shadow_t_max = if l.distance < f32::INFINITY {
+/// The next ray asked for is the shadow ray: what else the vertex plans comes after it.
+fn plan_shadow(st: &mut PathState, s: &Surface, l: &LightSample, contribution: Vec3) {
+    st.path.shadow_contribution = contribution;
+    st.ray.direction = l.direction;
+    st.ray.t_max = if l.distance < f32::INFINITY {
         l.distance - SHADOW_SHORTEN * l.distance - SHADOW_SHORTEN_ERRORS * s.error
     } else {
         f32::INFINITY
     };
     let real_light = l.side == 0;
-    st.shadow_request = match st.mode {
+    st.ray.request = match st.path.mode {
         MODE_DIFFERENCE if real_light => REQUEST_SHADOW_DIFFERENCE,
         MODE_REAL => REQUEST_SHADOW_REAL,
         MODE_SHARED if real_light => REQUEST_SHADOW_PAIR,
         _ => REQUEST_SHADOW_MIXED,
     };
-    st.pending |= PENDING_SHADOW;
+    st.path.pending |= PENDING_SHADOW;
 }
 
 /// Roulette by the last number of a set.
@@ -286,17 +291,19 @@ fn plan_cone(
     if !bsdf_is_lambertian(s) {
         density += f.pdf;
     }
-    st.pending |= PENDING_NEXT;
-    st.next_direction = c.direction;
-    st.next_throughput = st.throughput * f.f_cos * (1.0 / density);
-    st.next_density = density;
-    st.next_medium = medium_along(st, s, c.direction);
+    st.path.pending |= PENDING_NEXT;
+    st.next = Segment {
+        direction: c.direction,
+        density,
+        throughput: st.path.throughput * f.f_cos * (1.0 / density),
+        medium: medium_along(st, s, c.direction),
+    };
 }
 
 /// Material whose volume a direction from the vertex leads through, or NONE.
 fn medium_along(st: &PathState, s: &Surface, direction: Vec3) -> u32 {
     if s.flags & MATERIAL_THIN_WALLED != 0 || s.ng.dot(direction) >= 0.0 {
-        return st.medium;
+        return st.path.medium;
     }
     if s.front { s.material } else { NONE }
 }
@@ -309,19 +316,17 @@ fn plan_continuation(
     wo: Vec3,
     techniques: Option<&Techniques>,
 ) {
-    let difference = techniques.is_some();
-    if difference && left_to_cones(scene, s) && st.depth >= scene.frame.max_bounces {
+    let difference = is_difference(st);
+    let left_to_cones = left_to_cones(scene, s);
+    if difference && left_to_cones && st.ray.depth >= scene.frame.max_bounces {
         return;
     }
-    let u = draw(
-        scene,
-        st,
-        if difference {
-            SET_DIFFERENCE_BSDF
-        } else {
-            SET_PATH_BSDF
-        },
-    );
+    let set = if difference {
+        SET_DIFFERENCE_BSDF
+    } else {
+        SET_PATH_BSDF
+    };
+    let u = draw(scene, st, set);
     if techniques.is_some_and(|t| !plays(&u, t.bsdf_probability)) {
         return;
     }
@@ -335,34 +340,37 @@ fn plan_continuation(
     if !b.valid {
         return;
     }
-    let density = if b.delta { DELTA_DENSITY } else { b.pdf };
-    let mut throughput = st.throughput * b.weight;
+    let mut segment = Segment {
+        direction: b.wi,
+        density: if b.delta { DELTA_DENSITY } else { b.pdf },
+        throughput: st.path.throughput * b.weight,
+        medium: medium_along(st, s, b.wi),
+    };
     if let Some(t) = techniques {
-        st.pending |= PENDING_DIFFERENCE;
-        st.difference_position = st.position;
-        st.difference_offset = st.offset;
-        st.difference_coincidence_ratio = st.coincidence_ratio;
-        st.difference_t_min = st.real_t_min;
-        st.difference_depth = st.depth;
-        st.difference_direction = b.wi;
-        st.difference_left_to_cones = left_to_cones(scene, s);
-        st.difference_normal = s.ns;
-        st.difference_cone_probability = t.cone_probability;
-        st.difference_density = if b.delta { DELTA_DENSITY } else { b.pdf };
-        st.difference_throughput = throughput * (1.0 / t.bsdf_probability);
-        st.difference_medium = medium_along(st, s, b.wi);
+        segment.throughput *= 1.0 / t.bsdf_probability;
+        st.path.pending |= PENDING_DIFFERENCE;
+        st.difference = DifferenceRay {
+            origin: st.ray.origin,
+            segment,
+            normal: s.ns,
+            cone_probability: t.cone_probability,
+            depth: st.ray.depth,
+            request: if left_to_cones {
+                REQUEST_REAL_UNLESS_COVERED
+            } else {
+                REQUEST_CLOSEST_EACH
+            },
+            pad: [0; 2],
+        };
         return;
     }
-    if st.depth >= ROULETTE_FROM_DEPTH {
-        let survival = (ROULETTE_GAIN * throughput.abs().max_element()).min(1.0);
+    if st.ray.depth >= ROULETTE_FROM_DEPTH {
+        let survival = (ROULETTE_GAIN * segment.throughput.abs().max_element()).min(1.0);
         if !plays(&u, survival) {
             return;
         }
-        throughput *= 1.0 / survival;
+        segment.throughput *= 1.0 / survival;
     }
-    st.pending |= PENDING_NEXT;
-    st.next_direction = b.wi;
-    st.next_throughput = throughput;
-    st.next_density = density;
-    st.next_medium = medium_along(st, s, b.wi);
+    st.path.pending |= PENDING_NEXT;
+    st.next = segment;
 }

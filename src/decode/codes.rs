@@ -1,11 +1,12 @@
 //! PNG, JPEG and WebP: encoded codes of 8 or 16 bits.
 
+use std::borrow::Cow;
 use std::io::Cursor;
 
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
-use super::jpeg::{MAX_SCANS, outline};
+use super::jpeg::{MAX_SCANS, outline, with_standard_tables};
 use super::{ImageFile, Pixels, Rgba8, broken, check_size, ensure_memory};
 
 /// Of a decoded pixel in linear light, which a photograph keeps beside its codes.
@@ -23,12 +24,11 @@ pub(super) fn read_png(bytes: &[u8]) -> Result<ImageFile, String> {
 }
 
 pub(super) fn read_jpeg(bytes: &[u8]) -> Result<ImageFile, String> {
-    check_jpeg(bytes)?;
-    read_codes(bytes, ImageFormat::Jpeg)
+    read_codes(&checked_jpeg(bytes)?, ImageFormat::Jpeg)
 }
 
-/// What a decoder would take long for, or pass over in silence.
-fn check_jpeg(bytes: &[u8]) -> Result<(), String> {
+/// Refuses what a decoder would take long for or pass over in silence; brings the tables that a picture may leave out.
+fn checked_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     let outline = outline(bytes, 0);
     if outline.scans > MAX_SCANS {
         return Err(format!(
@@ -39,7 +39,10 @@ fn check_jpeg(bytes: &[u8]) -> Result<(), String> {
     if outline.end.is_none() {
         return Err(broken("it ends before its end-of-image marker"));
     }
-    Ok(())
+    Ok(match outline.has_tables {
+        true => Cow::Borrowed(bytes),
+        false => Cow::Owned(with_standard_tables(bytes)),
+    })
 }
 
 const PROFILE: &str = "its colour profile is ignored: it is read as sRGB";
@@ -88,10 +91,11 @@ pub(super) fn read_rgba8(bytes: &[u8]) -> Result<Rgba8, String> {
     let format = format
         .filter(|f| matches!(f, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP))
         .ok_or("its format is not known; expected PNG, JPEG or WebP; convert the image")?;
-    if format == ImageFormat::Jpeg {
-        check_jpeg(bytes)?;
-    }
-    let (decoder, size) = open(bytes, format)?;
+    let bytes = match format {
+        ImageFormat::Jpeg => checked_jpeg(bytes)?,
+        _ => Cow::Borrowed(bytes),
+    };
+    let (decoder, size) = open(&bytes, format)?;
     ensure_decoding(&decoder, size, format, 4)?;
     let decoded = DynamicImage::from_decoder(decoder).map_err(broken)?;
     let codes = decoded.into_rgba8().into_raw();

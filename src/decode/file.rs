@@ -1,9 +1,9 @@
 //! Reading whole files, none of which may be without an end.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use crate::files;
 use crate::memory::{Bytes, ensure};
 
 /// Longest text: a scene, a noise profile, a table.
@@ -20,7 +20,7 @@ const MAX_UNKNOWN_BYTES: u64 = 1 << 30;
 /// # Errors
 /// The reason, without the path.
 pub(crate) fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, String> {
-    let file = File::open(path).map_err(|error| error.to_string())?;
+    let file = files::open(path).map_err(|error| error.to_string())?;
     let meta = file.metadata().map_err(|error| error.to_string())?;
     if meta.is_file() {
         if meta.len() > limit {

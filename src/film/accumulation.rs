@@ -1,7 +1,6 @@
 //! The film: sums over camera samples, a record a pixel.
 
-use crate::film::sums::{GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
-use glam::Vec3;
+use crate::film::sums::{GuideSums, PixelSums};
 
 /// What a pixel shows, known from the samples taken so far (design: background M = 0, virtual M = 1, edge between).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,25 +92,6 @@ impl Film {
     /// Index after a pixel's last sample, if it takes those of the rays up to `end`.
     pub fn end_index(&self, pixel: usize, end: u32) -> u32 {
         end * self.pixels[pixel].sample_factor.max(1)
-    }
-
-    /// Adds the pixel's next sample.
-    pub fn add(&mut self, pixel: usize, sample: &Sample) {
-        let first = self.first_index(pixel);
-        let sums = &mut self.pixels[pixel];
-        let index = first + sums.n;
-        sums.add(index, sample);
-        if let (Some(guide), Some(sums)) = (sample.guide, self.guides.get_mut(pixel)) {
-            guide_add(sums, guide.depth_m, guide.normal, guide.albedo);
-        }
-    }
-
-    /// Adds the real radiance of the pixel's sample number `first_index + n_real`.
-    pub fn add_real(&mut self, pixel: usize, is_virtual: bool, real: Vec3) {
-        let first = self.first_index(pixel);
-        let sums = &mut self.pixels[pixel];
-        let index = first + sums.n_real;
-        pixel_add_real(sums, index, is_virtual, real);
     }
 
     pub fn kind(&self, pixel: usize) -> PixelKind {
@@ -213,8 +193,10 @@ fn kind(sums: &PixelSums) -> PixelKind {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
-    use crate::film::sums::Guide;
+    use crate::film::{Sample, guide_add};
 
     fn noise(i: u32) -> f32 {
         let mut x = i.wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
@@ -230,11 +212,6 @@ mod tests {
             is_virtual: at(0) < 0.4 + 0.2 * pixel as f32,
             contribution: Vec3::new(at(1), at(2) * 100.0, at(3) - 0.5),
             real: Some(Vec3::new(at(4), at(5), at(6))),
-            guide: (at(7) < 0.9).then(|| Guide {
-                depth_m: 1.0 + at(8),
-                normal: Vec3::Y,
-                albedo: Vec3::splat(at(9)),
-            }),
         }
     }
 
@@ -243,6 +220,15 @@ mod tests {
         for pixel in 0..3 {
             for index in range.clone() {
                 film.add(pixel, &sample(pixel as u32, index));
+                let at = |d| noise(pixel as u32 * 7919 + index * 13 + d);
+                if at(7) < 0.9 {
+                    guide_add(
+                        &mut film.guides[pixel],
+                        1.0 + at(8),
+                        Vec3::Y,
+                        Vec3::splat(at(9)),
+                    );
+                }
             }
         }
         film

@@ -263,7 +263,6 @@ mod tests {
                         is_virtual: pixel == 100,
                         contribution: Vec3::splat(2.0 * x * truth(pixel)),
                         real: None,
-                        guide: None,
                     },
                 );
             }

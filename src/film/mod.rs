@@ -7,7 +7,9 @@ mod filter;
 mod flip;
 mod pools;
 mod scrambles;
-mod sums;
+pub(crate) mod sums;
+#[cfg(test)]
+mod test_support;
 
 pub use accumulation::{Film, MergeError, PixelCounts, PixelKind};
 pub use compare::{Comparison, SizeMismatch, compare};
@@ -21,6 +23,6 @@ pub use flip::{flip, flip_map};
 pub use pools::pooled;
 pub use scrambles::Scrambles;
 pub use sums::{
-    Guide, GuideSums, PixelSums, Sample, Sum3, guide_add, is_unusable, pixel_add, pixel_add_real,
-    sum_add, sum3_add, two_sum,
+    GuideSums, PixelSums, Sample, Sum3, guide_add, is_unusable, pixel_add, pixel_add_real, sum_add,
+    sum3_add, two_sum,
 };

@@ -232,7 +232,6 @@ mod tests {
                     is_virtual,
                     contribution: Vec3::splat(contribution),
                     real: Some(Vec3::splat(ir)),
-                    guide: None,
                 },
             );
         }

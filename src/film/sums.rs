@@ -7,8 +7,59 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
-/// Bits of 1e15, the largest magnitude that is accumulated: its square still sums over a million samples without overflow.
-const LARGEST_SAMPLE_BITS: u32 = 0x5863_5fa9;
+use crate::shared::{Array, shared};
+
+shared! {
+    /// Bits of 1e15, the largest magnitude that is accumulated: its square still sums over a million samples without overflow.
+    const LARGEST_SAMPLE_BITS: u32 = 0x5863_5fa9;
+
+    /// Three double-floats.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+    pub struct Sum3 {
+        pub hi: [f32; 3] as Array<f32, 3>,
+        pub lo: [f32; 3] as Array<f32, 3>,
+    }
+
+    /// Sums over the samples of one pixel; all zeros before the first.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+    pub struct PixelSums {
+        /// Sum of m * im.
+        pub m_im: Sum3,
+        /// Sum of (1 - m) * (im - ir), the direct difference.
+        pub diff: Sum3,
+        /// Sum of m * ir over the real pass.
+        pub m_ir: Sum3,
+        /// Sum of (1 - m) * ir over the real pass.
+        pub r_ir: Sum3,
+        /// Sum of squares of the per-sample contribution m * im + (1 - m) * (im - ir).
+        pub sq: Sum3,
+        /// Samples of the main pass.
+        pub n: u32,
+        /// Samples of the main pass that met virtual geometry first.
+        pub m: u32,
+        /// The real pass has covered the first `n_real` samples of this pixel.
+        pub n_real: u32,
+        /// Samples left out of the radiance sums because they were not finite (or beyond 1e15).
+        pub non_finite: u32,
+        /// Index of the first of those; means nothing while `non_finite` is 0.
+        pub first_non_finite: u32,
+        /// Samples that the pixel takes for every ray per pixel asked for; 0 counts as 1.
+        pub sample_factor: u32,
+    }
+
+    /// Sums over the primary hits of one pixel, for the depth, normal and albedo planes.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+    pub struct GuideSums {
+        /// Metres along the view axis.
+        pub depth_hi: f32,
+        pub depth_lo: f32,
+        pub normal: Sum3,
+        pub albedo: Sum3,
+        /// Samples that met something.
+        pub hits: u32,
+        pub pad: u32,
+    }
+}
 
 /// `s + e == a + b` exactly, `s` being the rounded sum (Knuth).
 pub fn two_sum(a: f32, b: f32) -> (f32, f32) {
@@ -46,14 +97,6 @@ pub fn is_unusable(x: Vec3) -> bool {
         .any(|c| c.to_bits() & 0x7fff_ffff > LARGEST_SAMPLE_BITS)
 }
 
-/// Three double-floats.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Sum3 {
-    pub hi: [f32; 3],
-    pub lo: [f32; 3],
-}
-
 impl Sum3 {
     pub fn value(&self) -> DVec3 {
         DVec3::from_array([0, 1, 2].map(|c| f64::from(self.hi[c]) + f64::from(self.lo[c])))
@@ -83,46 +126,6 @@ pub struct Sample {
     pub contribution: Vec3,
     /// The real radiance ir of the same sample, if it was traced.
     pub real: Option<Vec3>,
-    /// What the primary mixed ray met, if it met anything.
-    pub guide: Option<Guide>,
-}
-
-/// The first surface of a primary mixed ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Guide {
-    /// Metres along the view axis.
-    pub depth_m: f32,
-    /// Unit, world space.
-    pub normal: Vec3,
-    pub albedo: Vec3,
-}
-
-/// Sums over the samples of one pixel; all zeros before the first.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct PixelSums {
-    /// Sum of m * im.
-    pub m_im: Sum3,
-    /// Sum of (1 - m) * (im - ir), the direct difference.
-    pub diff: Sum3,
-    /// Sum of m * ir over the real pass.
-    pub m_ir: Sum3,
-    /// Sum of (1 - m) * ir over the real pass.
-    pub r_ir: Sum3,
-    /// Sum of squares of the per-sample contribution m * im + (1 - m) * (im - ir).
-    pub sq: Sum3,
-    /// Samples of the main pass.
-    pub n: u32,
-    /// Samples of the main pass that met virtual geometry first.
-    pub m: u32,
-    /// The real pass has covered the first `n_real` samples of this pixel.
-    pub n_real: u32,
-    /// Samples left out of the radiance sums because they were not finite (or beyond 1e15).
-    pub non_finite: u32,
-    /// Index of the first of those; means nothing while `non_finite` is 0.
-    pub first_non_finite: u32,
-    /// Samples that the pixel takes for every ray per pixel asked for; 0 counts as 1.
-    pub sample_factor: u32,
 }
 
 impl PixelSums {
@@ -203,20 +206,6 @@ fn count_unusable(sums: &mut PixelSums, index: u32) {
     sums.non_finite += 1;
 }
 
-/// Sums over the primary hits of one pixel, for the depth, normal and albedo planes.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct GuideSums {
-    /// Metres along the view axis.
-    pub depth_hi: f32,
-    pub depth_lo: f32,
-    pub normal: Sum3,
-    pub albedo: Sum3,
-    /// Samples that met something.
-    pub hits: u32,
-    pub pad: u32,
-}
-
 impl GuideSums {
     pub fn depth(&self) -> f64 {
         f64::from(self.depth_hi) + f64::from(self.depth_lo)
@@ -247,7 +236,6 @@ pub fn guide_add(sums: &mut GuideSums, depth_m: f32, normal: Vec3, albedo: Vec3)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::mem::{offset_of, size_of};
 
     fn noise(i: u32) -> f32 {
         let mut x = i.wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
@@ -286,7 +274,6 @@ mod tests {
                     is_virtual: false,
                     contribution: Vec3::new(0.5, x, 0.5),
                     real: Some(Vec3::ONE),
-                    guide: None,
                 },
             );
         };
@@ -310,7 +297,6 @@ mod tests {
             is_virtual: true,
             contribution: Vec3::ONE,
             real,
-            guide: None,
         };
         let mut sums = PixelSums::default();
         sums.add(0, &sample(Some(Vec3::ONE)));
@@ -321,54 +307,11 @@ mod tests {
         assert_eq!(sums.m_ir.value(), DVec3::splat(2.0));
     }
 
-    /// Sizes and offsets of the WGSL structs, by naga's reflection, against the Rust records.
-    #[test]
-    fn records_have_the_layout_of_the_shader() {
-        let module = naga::front::wgsl::parse_str(include_str!("../../shaders/film/sums.wgsl"))
-            .expect("film/sums.wgsl parses");
-        naga::valid::Validator::new(
-            naga::valid::ValidationFlags::all(),
-            naga::valid::Capabilities::empty(),
-        )
-        .validate(&module)
-        .expect("film/sums.wgsl is valid");
-        let layout = |name: &str| {
-            module
-                .types
-                .iter()
-                .find_map(|(_, t)| match (&t.inner, t.name.as_deref()) {
-                    (naga::TypeInner::Struct { members, span }, Some(n)) if n == name => Some((
-                        members
-                            .iter()
-                            .map(|m| (m.name.clone().unwrap_or_default(), m.offset as usize))
-                            .collect::<Vec<_>>(),
-                        *span as usize,
-                    )),
-                    _ => None,
-                })
-                .expect("struct exists")
-        };
-        macro_rules! host {
-            ($t:ty: $($f:ident)*) => {
-                (vec![$((stringify!($f).to_string(), offset_of!($t, $f))),*], size_of::<$t>())
-            };
-        }
-        assert_eq!(layout("Sum3"), host!(Sum3: hi lo));
-        let pixel = host!(PixelSums: m_im diff m_ir r_ir sq n m n_real non_finite first_non_finite sample_factor);
-        assert_eq!(layout("PixelSums"), pixel);
-        assert_eq!(
-            layout("GuideSums"),
-            host!(GuideSums: depth_hi depth_lo normal albedo hits pad)
-        );
-        let swapped = host!(PixelSums: diff m_im m_ir r_ir sq n m n_real non_finite first_non_finite sample_factor);
-        assert_ne!(layout("PixelSums"), swapped, "control");
-    }
-
     /// The shader sums bit for bit as this file does, whatever the compiler makes of it. Controls: a plain sum in the same
     /// shader, and the last bit of one input.
     #[test]
     fn the_shader_sums_the_same_bits() {
-        use crate::gpu::{Composer, Features, harness::Probe, harness::test_device};
+        use crate::gpu::{Features, harness::Probe, harness::test_device};
         let Some(gpu) = test_device() else { return };
         const STEPS: u32 = 300;
         let probe = Probe {
@@ -410,14 +353,7 @@ mod tests {
             scene: None,
         };
         let inputs: Vec<u32> = (0..64).flat_map(|record| [record, 0]).collect();
-        let film = include_str!("../../shaders/film/sums.wgsl");
-        let outputs = probe
-            .run_with(
-                gpu,
-                Composer::default().with_module("film::sums", film),
-                &inputs,
-            )
-            .expect("the probe runs");
+        let outputs = probe.run(gpu, &inputs).expect("the probe runs");
         let host = |record: u32, nudge: u32| -> Vec<u32> {
             let mut sums = PixelSums::default();
             for i in 0..STEPS {

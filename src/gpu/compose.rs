@@ -9,6 +9,7 @@ use wesl::{CompileOptions, Feature, Mangler, ModulePath, VirtualResolver, Wesl};
 use super::GpuError;
 use crate::packed::{self, PackedScene};
 use crate::shared::{self, Module};
+use crate::{accel, camera, cpu, film, light, material, math};
 
 /// The embedded modules, one a file of `shaders/`: name and source.
 pub const MODULES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/shader_modules.rs"));
@@ -136,7 +137,28 @@ pub(super) fn item_name(emitted: &str) -> &str {
 }
 
 /// What Rust declares for the shaders at the level of the estimator and below.
-pub(super) const DECLARED: &[&Module] = &[&shared::SHARED, &packed::records::SHARED];
+pub(super) const DECLARED: &[&Module] = &[
+    &shared::SHARED,
+    &math::SHARED,
+    &packed::records::SHARED,
+    &accel::trace::SHARED,
+    &camera::lens::SHARED,
+    &camera::sampler::SHARED,
+    &camera::shutter::SHARED,
+    &light::cones::SHARED,
+    &light::rectangle::SHARED,
+    &material::bsdf::SHARED,
+    &material::ggx::SHARED,
+    &material::lobes::SHARED,
+    &material::surface::SHARED,
+    &material::texture::SHARED,
+    &film::sums::SHARED,
+    &cpu::contribution::SHARED,
+    &cpu::estimator::SHARED,
+    &cpu::request::SHARED,
+    &cpu::state::SHARED,
+    &cpu::vertex::SHARED,
+];
 
 /// A set of modules to compose from: the embedded ones, some of them replaced or joined by others.
 pub struct Composer {

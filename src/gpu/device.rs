@@ -133,6 +133,11 @@ impl GpuDevice {
     /// # Errors
     /// [`GpuError::NoAdapter`] says what was found instead; [`GpuError::Open`] if the driver refuses.
     pub fn open(choice: AdapterChoice) -> Result<Self, GpuError> {
+        if let Some(kilobytes) = crate::memory::small_stacks() {
+            return Err(GpuError::NoAdapter(format!(
+                "the stacks of {kilobytes} kB that the shell allows are too small for drivers; expected 1024 or more (ulimit -s)"
+            )));
+        }
         let found = adapters();
         let best = found
             .iter()

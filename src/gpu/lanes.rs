@@ -1,7 +1,11 @@
-//! The buffers of a batch of samples in flight: bind group 1, as `shaders/gpu/lanes.wgsl` declares it.
+//! The buffers of a batch of samples in flight: bind group 1, as `shaders/gpu/lanes.wgsl` declares it, and the parts of the samples' states,
+//! bind group 2, as `shaders/cpu/state.wgsl` does.
+
+use std::collections::BTreeMap;
 
 use bytemuck::{AnyBitPattern, Pod, Zeroable};
 
+use super::kernel::Kernel;
 use super::{GpuDevice, GpuError};
 use crate::film::{GuideSums, PixelSums};
 use crate::work::{PixelWork, RayCounts};
@@ -36,13 +40,27 @@ const SUMS_BYTES: u64 = size_of::<PixelSums>() as u64;
 const GUIDE_BYTES: u64 = size_of::<GuideSums>() as u64;
 const WORK_BYTES: u64 = size_of::<PixelWork>() as u64;
 
+/// Bind group of the parts of a sample's state.
+pub(super) const PARTS_GROUP: u32 = 2;
+
+/// Bytes of one sample in the array of each part of its state that `kernels` use, by name.
+pub fn state_parts(kernels: &[Kernel]) -> BTreeMap<String, u64> {
+    kernels
+        .iter()
+        .flat_map(Kernel::bindings)
+        .filter(|binding| binding.group == PARTS_GROUP)
+        .map(|binding| (binding.name.clone(), u64::from(binding.stride)))
+        .collect()
+}
+
 /// Buffers for up to `capacity` lanes.
 pub struct Lanes {
     pub capacity: usize,
     pub with_guides: bool,
     pub batch: wgpu::Buffer,
     pub work: wgpu::Buffer,
-    pub paths: wgpu::Buffer,
+    /// By name.
+    pub parts: BTreeMap<String, wgpu::Buffer>,
     pub queues: [wgpu::Buffer; 2],
     pub counters: wgpu::Buffer,
     pub indirect: wgpu::Buffer,
@@ -52,9 +70,9 @@ pub struct Lanes {
     pub staging: wgpu::Buffer,
 }
 
-/// As many lanes as the device can bind, with `path_bytes` for the state of one.
-pub fn most_lanes(gpu: &GpuDevice, path_bytes: u64) -> usize {
-    let largest = path_bytes.max(SUMS_BYTES + GUIDE_BYTES + COUNTERS_BYTES);
+/// As many lanes as take no more memory than the largest array that the device can bind, with `state_bytes` for the state of one.
+pub fn most_lanes(gpu: &GpuDevice, state_bytes: u64) -> usize {
+    let largest = state_bytes.max(SUMS_BYTES + GUIDE_BYTES + COUNTERS_BYTES);
     let bindable = gpu
         .limits
         .max_storage_buffer_binding_size
@@ -70,7 +88,7 @@ impl Lanes {
     pub fn new(
         gpu: &GpuDevice,
         capacity: usize,
-        path_bytes: u64,
+        parts: &BTreeMap<String, u64>,
         with_guides: bool,
     ) -> Result<Self, GpuError> {
         use wgpu::BufferUsages as Usage;
@@ -96,7 +114,10 @@ impl Lanes {
                 Usage::UNIFORM | Usage::COPY_DST,
             ),
             work: make("work", WORK_BYTES * count, filled),
-            paths: make("paths", path_bytes * count, Usage::STORAGE),
+            parts: parts
+                .iter()
+                .map(|(name, bytes)| (name.clone(), make(name, bytes * count, Usage::STORAGE)))
+                .collect(),
             queues: [queue(), queue()],
             counters: make("counters", COUNTERS_BYTES, both),
             indirect: make("indirect", 12, Usage::STORAGE | Usage::INDIRECT),
@@ -110,26 +131,25 @@ impl Lanes {
         })
         .map_err(|error| GpuError::Limit {
             what: format!("a batch of {capacity} samples"),
-            needed: format!("{} MiB", (count * path_bytes) >> 20),
+            needed: format!("{} MiB", (count * parts.values().sum::<u64>()) >> 20),
             available: format!("memory ({error})"),
             adapter: gpu.name(),
             advice: "render with --backend cpu",
         })
     }
 
-    /// The buffer of that name in `shaders/gpu/lanes.wgsl`; `parity` says which queue is read.
+    /// The buffer of that name in `shaders/gpu/lanes.wgsl` or `shaders/cpu/state.wgsl`; `parity` says which queue is read.
     pub fn get(&self, name: &str, parity: usize) -> Option<&wgpu::Buffer> {
         Some(match name {
             "batch" => &self.batch,
             "work" => &self.work,
-            "paths" => &self.paths,
             "queue_in" => &self.queues[parity],
             "queue_out" => &self.queues[1 - parity],
             "counters" => &self.counters,
             "indirect" => &self.indirect,
             "pixel_sums" => &self.pixel_sums,
             "guide_sums" => &self.guide_sums,
-            _ => return None,
+            part => return self.parts.get(part),
         })
     }
 

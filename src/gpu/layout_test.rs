@@ -47,15 +47,20 @@ impl Reflected {
         };
         let expressions = &self.module.global_expressions;
         let value = |expression: &naga::Expression| match expression {
-            naga::Expression::Compose { components, .. } => {
-                let parts: Vec<f32> = components
-                    .iter()
-                    .filter_map(|part| match literal(&expressions[*part]) {
-                        Some(Value::F32(x)) => Some(x),
-                        _ => None,
-                    })
-                    .collect();
-                parts.try_into().ok().map(Value::Vec3)
+            naga::Expression::Compose { ty, components } => {
+                let (mut words, mut numbers) = (Vec::new(), Vec::new());
+                for part in components {
+                    match literal(&expressions[*part])? {
+                        Value::U32(x) => words.push(x),
+                        Value::F32(x) => numbers.push(x),
+                        _ => return None,
+                    }
+                }
+                match self.module.types[*ty].inner {
+                    naga::TypeInner::Vector { .. } => numbers.try_into().ok().map(Value::Vec3),
+                    _ if numbers.is_empty() => Some(Value::U32s(words)),
+                    _ => Some(Value::F32s(numbers)),
+                }
             }
             other => literal(other),
         };

@@ -54,6 +54,8 @@ pub enum GpuError {
 #[cfg(test)]
 pub(crate) mod layout_test;
 #[cfg(test)]
+mod traffic_test;
+#[cfg(test)]
 mod variants_test;
 #[cfg(test)]
 mod wavefront_test;

@@ -65,9 +65,10 @@ fn kernels_bind_what_they_use_and_no_more() {
     let accumulate: BTreeSet<String> = set(&[
         "frame",
         "batch",
-        "counters",
         "guide_sums",
-        "paths",
+        "path_first_hits",
+        "path_radiances_real",
+        "path_results",
         "pixel_sums",
         "work",
     ]);
@@ -321,7 +322,7 @@ fn an_invalid_variant_is_noticed() {
     let broken = Composer::default().with_module(
         "cpu::request",
         "import package::cpu::state::PathState;
-        fn answer(path: ptr<function, PathState>, thread: u32) { @if(clearcoat) { _ = not_there(thread); } }",
+        fn answer(st: ptr<function, PathState>, thread: u32) { @if(clearcoat) { _ = not_there(thread); } }",
     );
     valid(&broken, "kernel_trace", &Features::all());
 }

@@ -1,11 +1,12 @@
 //! Runs samples as a wavefront: a batch of them advances one step a dispatch, the finished ones leave the queue, and at the end one
 //! thread a pixel adds the samples to the pixel's sums in their order. What reaches the film does not depend on how the work was cut.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
 use super::kernel::{BindGroups, Kernel};
-use super::lanes::{Batch, Counters, Lanes, most_lanes};
+use super::lanes::{Batch, Counters, Lanes, most_lanes, state_parts};
 use super::pacer::Pacer;
 use super::profile::{
     ACCUMULATE, ADVANCE, GENERATE, KERNELS, KernelSeconds, Profiler, TRACE, TURN,
@@ -28,8 +29,8 @@ pub struct GpuBackend {
     kernels: Vec<Kernel>,
     /// Kernels of other features that were in use before.
     parked: Vec<Parked>,
-    /// Bytes of the state of one sample.
-    path_bytes: u64,
+    /// Bytes of each part of the state of one sample, by name.
+    state_parts: BTreeMap<String, u64>,
     lanes: Option<Lanes>,
     /// By kernel and parity.
     groups: Vec<[BindGroups; 2]>,
@@ -61,12 +62,8 @@ fn compile(
         .collect()
 }
 
-fn path_bytes(kernels: &[Kernel]) -> u64 {
-    kernels[ADVANCE]
-        .bindings()
-        .iter()
-        .find(|binding| binding.name == "paths")
-        .map_or(16, |binding| u64::from(binding.stride))
+fn pacer(gpu: &GpuDevice, state_parts: &BTreeMap<String, u64>) -> Pacer {
+    Pacer::new(most_lanes(gpu, state_parts.values().sum()))
 }
 
 /// One dispatch of a submission.
@@ -134,10 +131,10 @@ impl GpuBackend {
             kernels: std::mem::replace(&mut self.kernels, kernels),
         };
         self.parked.push(before);
-        let path_bytes = path_bytes(&self.kernels);
-        if path_bytes != self.path_bytes {
-            self.path_bytes = path_bytes;
-            self.pacer = Pacer::new(most_lanes(&self.gpu, path_bytes));
+        let state_parts = state_parts(&self.kernels);
+        if state_parts != self.state_parts {
+            self.pacer = pacer(&self.gpu, &state_parts);
+            self.state_parts = state_parts;
         }
         self.lanes = None;
         self.warm = false;
@@ -160,15 +157,15 @@ impl GpuBackend {
         scene: SceneBuffers,
     ) -> Result<Self, GpuError> {
         let kernels = compile(&gpu, composer, features)?;
-        let path_bytes = path_bytes(&kernels);
-        let pacer = Pacer::new(most_lanes(&gpu, path_bytes));
+        let state_parts = state_parts(&kernels);
+        let pacer = pacer(&gpu, &state_parts);
         Ok(Self {
             gpu,
             scene,
             features: *features,
             kernels,
             parked: Vec::new(),
-            path_bytes,
+            state_parts,
             lanes: None,
             groups: Vec::new(),
             pacer,
@@ -244,7 +241,7 @@ impl GpuBackend {
         if present >= wanted {
             return Ok(wanted);
         }
-        match Lanes::new(&self.gpu, wanted, self.path_bytes, with_guides) {
+        match Lanes::new(&self.gpu, wanted, &self.state_parts, with_guides) {
             Ok(lanes) => {
                 self.bind(&lanes)?;
                 self.lanes = Some(lanes);

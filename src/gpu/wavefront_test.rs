@@ -8,58 +8,49 @@ use glam::Vec3;
 
 use super::harness::test_device;
 use super::*;
-use crate::film::{Film, Guide, Sample};
+use crate::film::{Film, Sample, guide_add};
 use crate::packed::Frame;
 use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
-
-const STATE: &str = "
-const STAGE_DONE: u32 = 0u;
-const FAR: f32 = 3.40282346638528859812e38;
-struct RayCounts { primary: u32, mixed: u32, real: u32, mixed_shadow: u32, real_shadow: u32 }
-struct PathState {
-    pixel: u32, index: u32, stage: u32, word: u32,
-    radiance: vec3<f32>, mask: u32, radiance_real: vec3<f32>, depth_m: f32, normal: vec3<f32>, hit_real: u32,
-    albedo: vec3<f32>, hit_virtual: u32, rays: RayCounts,
-}";
 
 /// A walk that ends at each step with probability 1/8; what it 'hits' is a hash of where it is.
 const ESTIMATOR: &str = "
 import package::gpu::buffers::frame;
-import package::cpu::state::{PathState, STAGE_DONE};
+import package::cpu::state::{PathState, STAGE_DONE, path_first_hits, path_results, path_state};
 import package::toy::mix_bits;
-fn begin_sample(pixel: u32, index: u32, real_pass: bool) -> PathState {
-    var path: PathState;
-    path.pixel = pixel;
-    path.index = index;
-    path.stage = select(1u, 2u, real_pass);
-    path.word = mix_bits(pixel * 65537u + index + frame.seed);
-    path.depth_m = 1.0;
-    path.rays.primary = 1u;
-    if path.word % 16u == 3u { path.stage = STAGE_DONE; }
-    return path;
+fn begin_sample(lane: u32, pixel: u32, index: u32, real_pass: bool) -> PathState {
+    var st = path_state(lane, pixel, index);
+    st.path.stage = select(1u, 2u, real_pass);
+    st.path.medium = mix_bits(pixel * 65537u + index + frame.seed);
+    st.ray.depth = st.path.medium ^ st.path.stage;
+    st.rays.primary = 1u;
+    if st.path.medium % 16u == 3u { st.path.stage = STAGE_DONE; }
+    return st;
 }
-fn advance(path: ptr<function, PathState>) {
-    let x = f32((*path).hit_real >> 8u) / 16777216.0;
-    (*path).word = (*path).hit_real;
-    (*path).mask = (*path).hit_real & 1u;
-    (*path).radiance += vec3<f32>(x, 1.0 - x, x * 0.5);
-    (*path).normal += vec3<f32>(x);
-    if (*path).hit_real % 8u == 0u { (*path).stage = STAGE_DONE; }
+fn advance(st: ptr<function, PathState>) {
+    let word = (*st).hits.in_real.triangle;
+    let x = f32(word >> 8u) / 16777216.0;
+    let lane = (*st).lane;
+    (*st).ray.depth = word ^ (*st).path.stage;
+    path_results[lane].mask = word & 1u;
+    path_results[lane].radiance += vec3<f32>(x, 1.0 - x, x * 0.5);
+    path_first_hits[lane].normal = path_results[lane].radiance.xxx;
+    path_first_hits[lane].albedo = vec3<f32>(0.0);
+    path_first_hits[lane].depth_m = 1.0;
+    if word % 8u == 0u { (*st).path.stage = STAGE_DONE; }
 }";
 
 const REQUEST: &str = "
 import package::cpu::state::PathState;
 import package::toy::mix_bits;
-fn answer(path: ptr<function, PathState>, thread: u32) {
-    (*path).hit_real = mix_bits((*path).word ^ (*path).stage);
-    (*path).rays.mixed += 1u;
+fn answer(st: ptr<function, PathState>, thread: u32) {
+    (*st).hits.in_real.triangle = mix_bits((*st).ray.depth);
+    (*st).rays.mixed += 1u;
 }";
 
 const TOY: &str = "fn mix_bits(word: u32) -> u32 { var x = word; x ^= x >> 16u; x *= 0x7feb352du; return x ^ (x >> 15u); }";
 
 pub(super) fn composer() -> Composer {
     Composer::default()
-        .with_module("cpu::state", STATE)
         .with_module("cpu::estimator", ESTIMATOR)
         .with_module("cpu::request", REQUEST)
         .with_module("toy", TOY)
@@ -71,8 +62,8 @@ fn mix(mut x: u32) -> u32 {
     x ^ (x >> 15)
 }
 
-/// Twin of the toy: the sample, and its rays.
-fn toy_sample(seed: u32, pixel: u32, index: u32, real_pass: bool) -> (Sample, u64) {
+/// Twin of the toy: the sample, its rays, and the normal where there are any.
+fn toy_sample(seed: u32, pixel: u32, index: u32, real_pass: bool) -> (Sample, u64, Vec3) {
     let stage = if real_pass { 2 } else { 1 };
     let mut word = mix(pixel
         .wrapping_mul(65537)
@@ -99,13 +90,8 @@ fn toy_sample(seed: u32, pixel: u32, index: u32, real_pass: bool) -> (Sample, u6
         is_virtual: mask != 0,
         contribution: radiance,
         real: None,
-        guide: Some(Guide {
-            depth_m: 1.0,
-            normal,
-            albedo: Vec3::ZERO,
-        }),
     };
-    (sample, rays)
+    (sample, rays, normal)
 }
 
 /// Twin of [`GpuBackend::render`]; returns the mixed rays.
@@ -114,12 +100,17 @@ fn toy_render(seed: u32, film: &mut Film, work: &WorkList) -> u64 {
     let real_pass = work.pass == Pass::Real;
     for w in &work.pixels {
         for index in w.first..w.end {
-            let (sample, rays) = toy_sample(seed, w.pixel, index, real_pass);
+            let (sample, rays, normal) = toy_sample(seed, w.pixel, index, real_pass);
             let pixel = w.pixel as usize;
             if real_pass {
                 film.add_real(pixel, sample.is_virtual, sample.contribution);
             } else {
                 film.add(pixel, &sample);
+                if let Some(guide) = film.guides.get_mut(pixel)
+                    && rays > 0
+                {
+                    guide_add(guide, 1.0, normal, Vec3::ZERO);
+                }
             }
             total += rays;
         }

@@ -3,24 +3,25 @@
 //! A direction that meets virtual geometry lies in at least one cone, so a mixture of uniform distributions over the cones covers all of (b) in
 //! docs/estimator.md. A sphere that subtends a wide cone, or contains the point, is replaced by the cosine-weighted hemisphere.
 
-use std::f32::consts::PI;
-
 use glam::{Vec3, Vec4};
 
-use crate::math::{cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
+use crate::math::{PI, cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
 use crate::packed::{Frame, LIGHT_QUAD, Light, MAX_SPHERES};
+use crate::shared::shared;
 
-/// Cones with a squared sine above this are sampled as the hemisphere: uniform sampling would waste what lies below the horizon.
-const WIDE_SIN2: f32 = 0.5;
-/// Widening of a cone, relative to its squared sine and absolute for the rounding of directions: a direction drawn at the rim stays inside.
-const CONE_PADDING: f32 = 1e-5;
-const CONE_PADDING_SIN2: f32 = 1e-9;
-/// Widening of a sphere's squared radius, relative to itself and to the squared distance: (r + e d)^2 <= r^2 (1 + k) + d^2 e^2 (1 + 1 / k)
-/// with k = 1e-3 and e = 4e-7, more than the rounding of the cross product.
-const SPHERE_PADDING: f32 = 1e-3;
-const SPHERE_PADDING_DISTANCE2: f32 = 2e-10;
-/// The largest cosine in a cone is overestimated by more than its rounding, so that no cone that reaches above the horizon counts as below.
-const COSINE_PADDING: f32 = 1e-6;
+shared! {
+    /// Cones with a squared sine above this are sampled as the hemisphere: uniform sampling would waste what lies below the horizon.
+    const WIDE_SIN2: f32 = 0.5;
+    /// Widening of a cone, relative to its squared sine and absolute for the rounding of directions: a direction drawn at the rim stays inside.
+    const CONE_PADDING: f32 = 1e-5;
+    const CONE_PADDING_SIN2: f32 = 1e-9;
+    /// Widening of a sphere's squared radius, relative to itself and to the squared distance: (r + e d)^2 <= r^2 (1 + k) + d^2 e^2 (1 + 1 / k)
+    /// with k = 1e-3 and e = 4e-7, more than the rounding of the cross product.
+    const SPHERE_PADDING: f32 = 1e-3;
+    const SPHERE_PADDING_DISTANCE2: f32 = 2e-10;
+    /// The largest cosine in a cone is overestimated by more than its rounding, so that no cone that reaches above the horizon counts as below.
+    const COSINE_PADDING: f32 = 1e-6;
+}
 
 /// One sphere seen from a point.
 #[derive(Clone, Copy)]

@@ -6,11 +6,9 @@
 //! the conditional distribution). Within it the density is bilinear in azimuth and cosine between the corners' luminances, so that the density
 //! everywhere is an interpolated luminance times one constant, continuous across cells, and a grey map is drawn almost exactly in proportion.
 
-use std::f32::consts::PI;
-
 use glam::Vec3;
 
-use crate::math::{atan2_, luminance, safe_sqrt, sincos_2pi};
+use crate::math::{PI, atan2_, luminance, safe_sqrt, sincos_2pi};
 use crate::packed::{Frame, PackedScene};
 
 /// Cumulative distributions for sampling a map by brightness.

@@ -8,7 +8,7 @@ use crate::material::triangle_emission;
 use crate::math::{cross3, dot3, length3, safe_sqrt};
 use crate::packed::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE,
-    PackedScene,
+    PackedScene, SIDE_REAL,
 };
 
 /// Light from one direction.
@@ -23,7 +23,7 @@ pub struct LightSample {
     /// Per solid angle, the probability of the light's choice included; for delta lights that probability alone. 0: nothing drawn.
     pub pdf: f32,
     pub delta: bool,
-    /// 0 real, 1 virtual.
+    /// `SIDE_REAL` or `SIDE_VIRTUAL`.
     pub side: u32,
 }
 
@@ -34,7 +34,7 @@ fn no_light() -> LightSample {
         radiance: Vec3::ZERO,
         pdf: 0.0,
         delta: false,
-        side: 0,
+        side: SIDE_REAL,
     }
 }
 

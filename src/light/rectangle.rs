@@ -1,20 +1,20 @@
 //! Rectangular lights by solid angle, after Ureña, Fajardo and King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013,
 //! in a form without their differences of nearly equal angles. WGSL twin: `shaders/light/rectangle.wgsl`.
 
-use std::f32::consts::PI;
-
 use glam::{Vec2, Vec3};
 
-use crate::math::{atan2_, cross3, dot3, length3, safe_sqrt, sincos_2pi};
+use crate::math::{INV_TAU, TAU, atan2_, cross3, dot3, length3, safe_sqrt, sincos_2pi};
 use crate::packed::{LIGHT_QUAD, Light};
+use crate::shared::shared;
 
-/// Smaller solid angles (sr) are sampled by area: the angle is a sum of four terms and would lose its precision.
-const MIN_SOLID_ANGLE: f32 = 0.02;
-/// Largest cosine between the edges of a quad that counts as a rectangle.
-const RIGHT_ANGLE: f32 = 1e-5;
-/// Coordinates are bounded by this many heights: beyond, the solid angle changes by less than 1 / FARTHEST.
-const FARTHEST: f32 = 3e4;
-const INV_TAU: f32 = 0.159_154_94;
+shared! {
+    /// Smaller solid angles (sr) are sampled by area: the angle is a sum of four terms and would lose its precision.
+    const MIN_SOLID_ANGLE: f32 = 0.02;
+    /// Largest cosine between the edges of a quad that counts as a rectangle.
+    const RIGHT_ANGLE: f32 = 1e-5;
+    /// Coordinates are bounded by this many heights: beyond, the solid angle changes by less than 1 / FARTHEST.
+    const FARTHEST: f32 = 3e4;
+}
 
 /// A rectangle seen from a point, in axes along its edges.
 pub struct Rectangle {
@@ -84,7 +84,7 @@ pub fn rectangle_from(light: &Light, position: Vec3) -> Rectangle {
     let whole = between(right, left);
     let mut solid_angle = atan2_(whole.y, whole.x);
     if solid_angle < 0.0 {
-        solid_angle += 2.0 * PI;
+        solid_angle += TAU;
     }
     if solid_angle >= MIN_SOLID_ANGLE {
         r.solid_angle = solid_angle;

@@ -19,8 +19,9 @@
 
 use glam::Vec3;
 
-use crate::math::{orthonormal_basis, sincos_2pi};
+use crate::math::{INV_PI, orthonormal_basis, sincos_2pi};
 use crate::packed::MATERIAL_LAMBERTIAN;
+use crate::shared::shared;
 
 use super::fresnel::{fresnel_dielectric, refract_about};
 use super::ggx::{ggx_reflect, ggx_refract, ggx_sample_half};
@@ -32,10 +33,11 @@ use super::lobes::{
 use super::normal::unit;
 use super::surface::Surface;
 
-/// A mirrored or refracted direction that rounding put on the wrong side of the surface is lifted to this height.
-const GRAZING_LIFT: f32 = 1e-4;
-const LARGEST_BELOW_1: f32 = 0.999_999_94;
-const INV_PI: f32 = std::f32::consts::FRAC_1_PI;
+shared! {
+    /// A mirrored or refracted direction that rounding put on the wrong side of the surface is lifted to this height.
+    const GRAZING_LIFT: f32 = 1e-4;
+    const LARGEST_BELOW_1: f32 = 0.999_999_94;
+}
 
 /// Non-delta lobes for one pair of directions.
 #[derive(Clone, Copy, Debug, PartialEq)]

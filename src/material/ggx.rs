@@ -5,14 +5,15 @@
 
 use glam::Vec3;
 
-use crate::math::{orthonormal_basis, sincos_2pi};
+use crate::math::{INV_PI, orthonormal_basis, sincos_2pi};
+use crate::shared::shared;
 
 use super::normal::unit;
 
-/// Cosines between `wo` and the normal are taken as no smaller than this.
-pub const MIN_COS: f32 = 1e-7;
-
-const INV_PI: f32 = std::f32::consts::FRAC_1_PI;
+shared! {
+    /// Cosines between `wo` and the normal are taken as no smaller than this.
+    pub const MIN_COS: f32 = 1e-7;
+}
 
 /// L(c) above, for c >= 0.
 pub fn smith_l(alpha: f32, c: f32) -> f32 {

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::packed::{MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT};
+use crate::shared::shared;
 
 use super::fresnel::{
     RelativeIndex, fresnel_dielectric, normal_reflectance, relative_index, schlick,
@@ -10,14 +11,16 @@ use super::fresnel::{
 use super::ggx::MIN_COS;
 use super::surface::Surface;
 
-/// GGX alpha under which a lobe counts as perfectly smooth: roughness 0.0316, a blur of a tenth of a degree.
-const DELTA_ALPHA: f32 = 1e-3;
-/// A rough interface bends light by about alpha * |ior - 1|; below this the bend is lost in f32 and light goes through unblurred.
-const DELTA_BEND: f32 = 1e-4;
-/// Reflectance of the clearcoat, index 1.5, at normal incidence.
-const COAT_F0: f32 = 0.04;
-/// Albedos up to this count as none: their reciprocal would overflow.
-pub const NO_ALBEDO: f32 = 1e-30;
+shared! {
+    /// GGX alpha under which a lobe counts as perfectly smooth: roughness 0.0316, a blur of a tenth of a degree.
+    const DELTA_ALPHA: f32 = 1e-3;
+    /// A rough interface bends light by about alpha * |ior - 1|; below this the bend is lost in f32 and light goes through unblurred.
+    const DELTA_BEND: f32 = 1e-4;
+    /// Reflectance of the clearcoat, index 1.5, at normal incidence.
+    const COAT_F0: f32 = 0.04;
+    /// Albedos up to this count as none: their reciprocal would overflow.
+    pub const NO_ALBEDO: f32 = 1e-30;
+}
 
 /// Share of light that an interface facet reflects and lets through.
 #[derive(Clone, Copy, Debug)]

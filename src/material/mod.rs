@@ -3,15 +3,15 @@
 //! [`surface_at`] turns a hit into a [`Surface`] with every texture read; [`bsdf_eval`] and [`bsdf_sample`] scatter light there.
 //! Each file has a WGSL twin of the same name in `shaders/`.
 
-mod bsdf;
+pub(crate) mod bsdf;
 mod fresnel;
-mod ggx;
-mod lobes;
+pub(crate) mod ggx;
+pub(crate) mod lobes;
 mod normal;
-mod surface;
+pub(crate) mod surface;
 #[cfg(test)]
 mod tests;
-mod texture;
+pub(crate) mod texture;
 
 pub use bsdf::{
     BsdfEval, BsdfSample, bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_is_delta,

@@ -10,20 +10,23 @@ use crate::packed::{
     MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, Material, NONE,
     PackedScene, TEXTURE_UV1, Triangle, Vertex,
 };
+use crate::shared::shared;
 
 use super::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
 use super::texture::{slot, slot_rgb, texture_sample};
 
-/// (7 u) / (1 - 7 u) with u = 2^-24: the bound on the relative error of a chain of seven roundings (Higham 2002, section 3.1).
-const GAMMA_7: f32 = 4.172_327e-7;
-/// Bound on the absolute error of 1 - u - v for barycentrics in 0..1: two roundings of numbers of at most 1.
-const BARYCENTRIC_ERROR: f32 = 1.192_092_9e-7;
-/// A triangle's weights are differences of products of two of its lengths, and four roundings of 2^-24 each.
-const PLANE_ERROR: f32 = 2.384_185_8e-7;
-/// Triangles slimmer than this (width over length) count as no slimmer: rays would leave them from too far off.
-const SLIMMEST: f32 = 1e-4;
-/// Relative difference up to which a depth in `photo_albedo` is the point's own.
-const PHOTO_DEPTH_TOLERANCE: f32 = 0.02;
+shared! {
+    /// (7 u) / (1 - 7 u) with u = 2^-24: the bound on the relative error of a chain of seven roundings (Higham 2002, section 3.1).
+    const GAMMA_7: f32 = 4.172_327e-7;
+    /// Bound on the absolute error of 1 - u - v for barycentrics in 0..1: two roundings of numbers of at most 1.
+    const BARYCENTRIC_ERROR: f32 = 1.192_092_9e-7;
+    /// A triangle's weights are differences of products of two of its lengths, and four roundings of 2^-24 each.
+    const PLANE_ERROR: f32 = 2.384_185_8e-7;
+    /// Triangles slimmer than this (width over length) count as no slimmer: rays would leave them from too far off.
+    const SLIMMEST: f32 = 1e-4;
+    /// Relative difference up to which a depth in `photo_albedo` is the point's own.
+    const PHOTO_DEPTH_TOLERANCE: f32 = 0.02;
+}
 
 /// What the scattering functions need to know about a point.
 #[derive(Clone, Copy, Debug)]

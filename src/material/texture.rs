@@ -6,13 +6,25 @@ use glam::{Vec2, Vec3, Vec4};
 
 use crate::packed::{
     PackedScene, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT,
-    TextureRef,
+    TextureRef, WRAP_MIRROR, WRAP_REPEAT,
 };
+use crate::shared::shared;
 
-const WRAP_REPEAT: u32 = 0;
-const WRAP_MIRROR: u32 = 1;
-
-const INV_255: f32 = 1.0 / 255.0;
+shared! {
+    const INV_255: f32 = 1.0 / 255.0;
+    /// Coefficients of x^0.4 in powers of sqrt(x) - 0.65, for x in 0.09..1.
+    const POWER_04: [f32; 9] = [
+        0.708_485,
+        0.871_979_9,
+        -0.134_144_57,
+        0.082_733_52,
+        -0.070_257_53,
+        0.063_800_65,
+        -0.065_409_54,
+        0.133_244_05,
+        -0.172_349_69,
+    ];
+}
 
 /// Decodes an sRGB value in 0..1 (IEC 61966-2-1) to within 6e-7 relative.
 ///
@@ -38,19 +50,6 @@ pub fn srgb_decode(encoded: f32) -> f32 {
     p = p * w + POWER_04[0];
     x * x * p
 }
-
-/// Coefficients of x^0.4 in powers of sqrt(x) - 0.65, for x in 0.09..1.
-const POWER_04: [f32; 9] = [
-    0.708_485,
-    0.871_979_9,
-    -0.134_144_57,
-    0.082_733_52,
-    -0.070_257_53,
-    0.063_800_65,
-    -0.065_409_54,
-    0.133_244_05,
-    -0.172_349_69,
-];
 
 /// `srgb_decode` of every 8-bit code.
 static SRGB_TABLE: LazyLock<[f32; 256]> =

@@ -47,6 +47,13 @@ pub fn ensure_lazy(mapped: u64, touched: u64, what: &str) -> Result<(), Shortage
     compare(mapped, touched, what, &system::limits())
 }
 
+/// Kilobytes of the stacks that threads of C libraries get, where those are too small for compilers such as graphics drivers have.
+pub(crate) fn small_stacks() -> Option<u64> {
+    const LEAST_KILOBYTES: u64 = 1024;
+    let kilobytes = system::stack_limit()? / 1024;
+    (kilobytes < LEAST_KILOBYTES).then_some(kilobytes)
+}
+
 /// What is left under one limit.
 struct Free {
     bytes: u64,
@@ -88,6 +95,10 @@ impl fmt::Display for Bytes {
 #[cfg(not(target_os = "linux"))]
 mod system {
     use super::Free;
+
+    pub fn stack_limit() -> Option<u64> {
+        None
+    }
 
     /// Without numbers of the system: what a machine of today has.
     pub fn limits() -> Vec<Free> {
@@ -142,6 +153,16 @@ mod system {
         .collect()
     }
 
+    pub fn stack_limit() -> Option<u64> {
+        limit_of(&read_to_string("/proc/self/limits").ok()?, "Max stack size")
+    }
+
+    /// A soft limit; `None` for "unlimited".
+    fn limit_of(limits: &str, name: &str) -> Option<u64> {
+        let line = limits.lines().find_map(|line| line.strip_prefix(name))?;
+        line.split_ascii_whitespace().next()?.parse().ok()
+    }
+
     /// "VmSize:   123 kB" as bytes.
     fn kilobytes(text: &str, key: &str) -> Option<u64> {
         let line = text.lines().find_map(|line| line.strip_prefix(key))?;
@@ -157,8 +178,7 @@ mod system {
 
     /// What a soft limit leaves; `None` for "unlimited".
     pub(super) fn free_of_limit(limits: &str, name: &str, status: &str, used: &str) -> Option<u64> {
-        let line = limits.lines().find_map(|line| line.strip_prefix(name))?;
-        let limit: u64 = line.split_ascii_whitespace().next()?.parse().ok()?;
+        let limit = limit_of(limits, name)?;
         Some(limit.saturating_sub(kilobytes(status, used)?))
     }
 

@@ -1,6 +1,8 @@
 //! Multilayer OpenEXR: 32-bit float, linear Rec.709, one part, layers by channel-name prefix.
 
 use std::collections::HashMap;
+use std::fs::File;
+use std::io::Write;
 
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text,
@@ -8,6 +10,7 @@ use exr::prelude::{
 };
 use exr::prelude::{Vec2, attribute::AttributeValue, attribute::Chromaticities};
 
+use super::exr_header::sort_attributes;
 use super::target::write_atomically;
 use super::{OutputError, Target};
 use crate::film::{Picture, Planes};
@@ -96,7 +99,7 @@ impl Metadata {
 }
 
 /// ITU-R BT.709 primaries and D65.
-pub(super) fn rec709() -> Chromaticities {
+fn rec709() -> Chromaticities {
     Chromaticities {
         red: Vec2(0.64, 0.33),
         green: Vec2(0.30, 0.60),
@@ -225,14 +228,15 @@ pub(super) fn write_channels(
     );
     let mut image = Image::from_layer(layer);
     image.attributes.chromaticities = Some(rec709());
+    let failed = |message: String| OutputError::Encode {
+        path: target.path().into(),
+        message,
+    };
     write_atomically(target.path(), |file| {
-        image
-            .write()
-            .to_buffered(file)
-            .map_err(|e| OutputError::Encode {
-                path: target.path().into(),
-                message: e.to_string(),
-            })
+        (image.write().to_buffered(&mut *file)).map_err(|error| failed(error.to_string()))?;
+        file.flush().map_err(|error| failed(error.to_string()))?;
+        let mut file: &File = file.get_ref();
+        sort_attributes(&mut file).map_err(|error| failed(error.to_string()))
     })
 }
 
@@ -357,6 +361,36 @@ mod tests {
             panic!("not a matrix");
         };
         assert_eq!(matrix[3], 4.25, "row-major: the translation ends the rows");
+    }
+
+    /// A hash map of attributes has another order each time.
+    #[test]
+    fn one_picture_is_one_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, value: f64| {
+            let target = Target::picture(&folder.path().join(name)).unwrap();
+            let mut channels = Channels::new();
+            push_channel(&mut channels, "R", vec![0.5f32; 6]);
+            let attributes = (0..9)
+                .map(|i| {
+                    (
+                        Text::from(format!("a{i}").as_str()),
+                        AttributeValue::F64(value),
+                    )
+                })
+                .collect();
+            write_channels(&target, 3, 2, channels, attributes).unwrap();
+            let file = exr::prelude::MetaData::read_from_file(target.path(), true).unwrap();
+            assert_eq!(file.headers[0].own_attributes.other.len(), 9);
+            std::fs::read(target.path()).unwrap()
+        };
+        let first = write("0.exr", 1.0);
+        for number in 1..8 {
+            assert_eq!(write(&format!("{number}.exr"), 1.0), first);
+        }
+        assert_ne!(write("other.exr", 2.0), first, "control");
+        let cut = &first[..first.len().min(300)];
+        assert!(sort_attributes(&mut std::io::Cursor::new(cut.to_vec())).is_err());
     }
 
     #[test]

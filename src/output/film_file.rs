@@ -341,7 +341,7 @@ fn guide_fields() -> Vec<Field<GuideSums, f32, String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{Guide, Sample, planes};
+    use crate::film::{Sample, guide_add, planes};
     use crate::renderer::Skip;
     use crate::scene::Camera;
     use glam::Vec3;
@@ -356,13 +356,13 @@ mod tests {
                     is_virtual: (pixel + index) % 3 == 0,
                     contribution: Vec3::new(x, if bad { f32::NAN } else { x * 1e-7 }, x * 1e9),
                     real: Some(Vec3::splat(x.abs())),
-                    guide: (index % 4 > 0).then_some(Guide {
-                        depth_m: 1.0 + x.abs(),
-                        normal: Vec3::new(x, 0.3, 0.1),
-                        albedo: Vec3::splat(x.abs()),
-                    }),
                 };
                 film.add(pixel as usize, &sample);
+                if index % 4 > 0 {
+                    let normal = Vec3::new(x, 0.3, 0.1);
+                    let guide = &mut film.guides[pixel as usize];
+                    guide_add(guide, 1.0 + x.abs(), normal, Vec3::splat(x.abs()));
+                }
             }
         }
         film

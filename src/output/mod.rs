@@ -1,21 +1,24 @@
 //! Pictures to files: PNG and multilayer EXR, written beside the target and renamed, so that no broken picture is ever left.
 
 mod exr_file;
+mod exr_header;
 mod film_file;
 mod plain;
 mod png_file;
 mod reference_file;
 mod target;
+mod temporary;
 
 pub use crate::decode::ChannelFile;
 pub use exr_file::{Metadata, write_exr};
 pub use film_file::{FilmNote, read_film, write_film};
 pub use plain::{write_composite, write_image};
-pub(crate) use png_file::picture_codes8;
+pub(crate) use png_file::{PNG_END, picture_codes8};
 pub use png_file::{PngBits, write_png};
 pub use reference_file::write_reference;
 pub use target::{Format, Target, write_bytes, write_text};
-pub(crate) use target::{check_distinct, check_writable};
+pub(crate) use target::{check_named, check_writable, quick, sync_folder};
+pub(crate) use temporary::{cut, remove_leftovers};
 
 use std::path::PathBuf;
 
@@ -26,10 +29,8 @@ pub enum OutputError {
     Extension { path: PathBuf },
     #[error("{}: is a folder or another special file; name a file to write", path.display())]
     NotAFile { path: PathBuf },
-    #[error("{}: is read here and would be overwritten; give the output another name", path.display())]
-    Input { path: PathBuf },
-    #[error("{}: named for two outputs; give each a name of its own", path.display())]
-    Twice { path: PathBuf },
+    #[error(transparent)]
+    Conflict(#[from] crate::files::Conflict),
     #[error("{}: cannot be written: {source}", path.display())]
     Io {
         path: PathBuf,

@@ -1,12 +1,8 @@
 //! A picture without a render behind it: just R, G and B.
 
-use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text,
-    Vec2, WritableImage,
-};
+use std::collections::HashMap;
 
-use super::exr_file::rec709;
-use super::target::write_atomically;
+use super::exr_file::{Channels, push_three, write_channels};
 use super::{Format, OutputError, PngBits, Target, write_png};
 use crate::film::Picture;
 use crate::scene::Photo;
@@ -39,32 +35,14 @@ pub fn write_composite(
 }
 
 fn write_rgb(target: &Target, picture: &Picture) -> Result<(), OutputError> {
-    let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = ["R", "G", "B"]
-        .into_iter()
-        .enumerate()
-        .map(|(c, name)| {
-            let samples = picture.linear.iter().map(|pixel| pixel[c]).collect();
-            AnyChannel::new(Text::from(name), FlatSamples::F32(samples))
-        })
-        .collect();
-    let attributes = LayerAttributes {
-        software_name: Some(Text::from(concat!("mixray ", env!("CARGO_PKG_VERSION")))),
-        ..LayerAttributes::default()
-    };
-    let mut image = Image::from_layer(Layer::new(
-        Vec2(picture.width as usize, picture.height as usize),
-        attributes,
-        Encoding::SMALL_LOSSLESS,
-        AnyChannels::sort(channels),
-    ));
-    image.attributes.chromaticities = Some(rec709());
-    write_atomically(target.path(), |file| {
-        image
-            .write()
-            .to_buffered(file)
-            .map_err(|error| OutputError::Encode {
-                path: target.path().into(),
-                message: error.to_string(),
-            })
-    })
+    let mut channels = Channels::new();
+    push_three(&mut channels, "", ["R", "G", "B"], &picture.linear);
+    let nothing_more = HashMap::new();
+    write_channels(
+        target,
+        picture.width,
+        picture.height,
+        channels,
+        nothing_more,
+    )
 }

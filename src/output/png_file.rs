@@ -9,6 +9,9 @@ use crate::film::Picture;
 use crate::scene::srgb::{encode8, encode16};
 use crate::scene::{EncodedPhoto, Photo};
 
+/// Its last chunk, which is the same in every file.
+pub(crate) const PNG_END: [u8; 12] = *b"\0\0\0\0IEND\xae\x42\x60\x82";
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PngBits {
     Eight,

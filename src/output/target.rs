@@ -1,10 +1,13 @@
 //! Output files, checked before the work begins and replaced whole at the end.
 
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::OutputError;
+use super::temporary::{self, cut, remove_leftovers};
+use crate::files;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
@@ -20,10 +23,10 @@ pub struct Target {
 }
 
 impl Target {
-    /// Checks the extension and that a file can be made in the folder.
+    /// Checks the extension and that a file can be made in the folder, and names it as an output of the run.
     ///
     /// # Errors
-    /// Another extension, a missing or read-only folder, or a target that is no regular file.
+    /// Another extension, a missing or read-only folder, a target that is no regular file, an input or another output.
     pub fn picture(path: &Path) -> Result<Self, OutputError> {
         let extension = path.extension().map(|e| e.to_ascii_lowercase());
         let format = match extension.as_ref().and_then(|e| e.to_str()) {
@@ -40,6 +43,14 @@ impl Target {
         })
     }
 
+    /// A picture file that is checked and named already.
+    pub(crate) fn named(path: &Path, format: Format) -> Self {
+        Self {
+            path: path.into(),
+            format,
+        }
+    }
+
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -49,38 +60,18 @@ impl Target {
     }
 }
 
-/// Fails now if [`write_atomically`] would fail later.
+/// Names the output, removes what ended runs have left of it, and fails now if [`write_atomically`] would fail later.
 pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
-    temporary_beside(path).map(|_| ())
-}
-
-/// Fails if an output would replace one of `inputs` or another output.
-pub(crate) fn check_distinct(outputs: &[&Path], inputs: &[PathBuf]) -> Result<(), OutputError> {
-    let inputs: Vec<PathBuf> = inputs.iter().map(|path| resolved(path)).collect();
-    let mut seen = Vec::new();
-    for path in outputs {
-        let resolved = resolved(path);
-        if inputs.contains(&resolved) {
-            return Err(OutputError::Input { path: path.into() });
-        }
-        if seen.contains(&resolved) {
-            return Err(OutputError::Twice { path: path.into() });
-        }
-        seen.push(resolved);
-    }
+    let (folder, name) = folder_and_name(&check_named(path)?)?;
+    remove_leftovers(&folder, |output| output == cut(&name));
     Ok(())
 }
 
-/// One path for each file however it is named, for files that do not exist yet too.
-fn resolved(path: &Path) -> PathBuf {
-    let of_folder = || {
-        let absolute = std::path::absolute(path).ok()?;
-        let folder = absolute.parent()?.canonicalize().ok()?;
-        Some(folder.join(absolute.file_name()?))
-    };
-    (path.canonicalize().ok())
-        .or_else(of_folder)
-        .unwrap_or_else(|| path.into())
+/// [`check_writable`], and leaves leftovers to the caller.
+pub(crate) fn check_named(path: &Path) -> Result<PathBuf, OutputError> {
+    files::output(path)?;
+    let (_, target) = temporary_beside(path)?;
+    Ok(target)
 }
 
 /// Replaces the file at `path` by `text`.
@@ -102,20 +93,63 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     })
 }
 
-/// Lets `write` fill a temporary file in the same folder, then renames it to `path`.
+/// As their namesakes, but no power cut is waited for: of what can be measured or drawn again.
+pub(crate) mod quick {
+    use super::{OutputError, Path, Write, io_error, replace};
+
+    pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
+        write_bytes(path, text.as_bytes())
+    }
+
+    pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+        let write = |file: &mut std::io::BufWriter<&std::fs::File>| {
+            file.write_all(bytes)
+                .map_err(|source| io_error(path, source))
+        };
+        replace(path, write, |_| Ok(()))?;
+        Ok(())
+    }
+}
+
+/// Lets `write` fill a temporary file in the same folder, then renames it to `path`. The file is on the disk before it has its name, and
+/// its name is before this ends.
 pub(super) fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&File>) -> Result<(), OutputError>,
 ) -> Result<(), OutputError> {
+    let target = replace(path, write, File::sync_all)?;
+    sync_folder(&target);
+    Ok(())
+}
+
+/// Gives what the file is called, links resolved.
+fn replace(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&File>) -> Result<(), OutputError>,
+    settle: impl FnOnce(&File) -> io::Result<()>,
+) -> Result<PathBuf, OutputError> {
+    files::before_write(path)?;
     let (temporary, target) = temporary_beside(path)?;
     let mut writer = BufWriter::new(temporary.as_file());
     write(&mut writer)?;
     writer.flush().map_err(|source| io_error(path, source))?;
     drop(writer);
+    settle(temporary.as_file()).map_err(|source| io_error(path, source))?;
     temporary
-        .persist(target)
+        .persist(&target)
         .map_err(|e| io_error(path, e.error))?;
-    Ok(())
+    Ok(target)
+}
+
+/// The names in the folder of a file that was renamed are on the disk, where the system can say so.
+pub(crate) fn sync_folder(target: &Path) {
+    #[cfg(unix)]
+    if let Ok((folder, _)) = folder_and_name(target)
+        && let Ok(folder) = File::open(folder)
+    {
+        // Some file systems cannot; the file itself is there.
+        let _ = folder.sync_all();
+    }
 }
 
 fn io_error(path: &Path, source: io::Error) -> OutputError {
@@ -125,6 +159,19 @@ fn io_error(path: &Path, source: io::Error) -> OutputError {
     }
 }
 
+fn folder_and_name(target: &Path) -> Result<(PathBuf, OsString), OutputError> {
+    let Some(name) = target.file_name() else {
+        return Err(OutputError::NotAFile {
+            path: target.into(),
+        });
+    };
+    let folder = match target.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    Ok((folder.into(), name.into()))
+}
+
 /// An empty temporary file in the folder of `path`, and the path to rename it to (links resolved, so that they stay links).
 fn temporary_beside(path: &Path) -> Result<(tempfile::NamedTempFile, PathBuf), OutputError> {
     let target = match path.metadata() {
@@ -132,24 +179,11 @@ fn temporary_beside(path: &Path) -> Result<(tempfile::NamedTempFile, PathBuf), O
             return Err(OutputError::NotAFile { path: path.into() });
         }
         Ok(_) => path.canonicalize().map_err(|e| io_error(path, e))?,
-        Err(e) if e.kind() == io::ErrorKind::NotFound => path.to_path_buf(),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => files::final_target(path),
         Err(e) => return Err(io_error(path, e)),
     };
-    let folder = match target.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".mixray-").suffix(".tmp");
-    #[cfg(unix)]
-    {
-        // tempfile's default of 0600 would leave the picture unreadable for others; the umask still applies.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let temporary = builder
-        .tempfile_in(folder)
-        .map_err(|source| io_error(path, source))?;
+    let (folder, name) = folder_and_name(&target)?;
+    let temporary = temporary::make(&folder, &name).map_err(|source| io_error(path, source))?;
     Ok((temporary, target))
 }
 
@@ -225,5 +259,9 @@ mod tests {
         write_text(&link, "new").unwrap();
         assert!(link.symlink_metadata().unwrap().is_symlink());
         assert_eq!(std::fs::read_to_string(&real).unwrap(), "new");
+        std::fs::remove_file(&real).unwrap();
+        write_text(&link, "made").unwrap();
+        assert!(link.symlink_metadata().unwrap().is_symlink());
+        assert_eq!(std::fs::read_to_string(&real).unwrap(), "made");
     }
 }

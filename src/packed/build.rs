@@ -7,9 +7,10 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::lights::pack_lights;
 use super::materials::{MaterialKey, MaterialTable};
 use super::{
-    FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER, FRAME_SHUTTER_ORDERED, Frame,
-    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL,
-    PackedScene, PixelInfo, Triangle, Vertex,
+    ESTIMATOR_DIRECT, ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER,
+    FRAME_SHUTTER_ORDERED, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE,
+    PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, SAMPLER_CMJ, SAMPLER_JITTERED,
+    SAMPLER_SOBOL, Triangle, Vertex,
 };
 use crate::accel::{AccelError, WorldBvh};
 use crate::camera::lens::frame_camera;
@@ -138,13 +139,13 @@ impl PackedScene {
         frame.max_bounces = settings.max_bounces;
         frame.clamp_indirect = settings.clamp_indirect.min(f32::MAX);
         frame.sampler = match settings.sampler {
-            SamplerKind::Jittered => 0,
-            SamplerKind::Cmj => 1,
-            SamplerKind::Sobol => 2,
+            SamplerKind::Jittered => SAMPLER_JITTERED,
+            SamplerKind::Cmj => SAMPLER_CMJ,
+            SamplerKind::Sobol => SAMPLER_SOBOL,
         };
         frame.estimator = match settings.estimator {
-            Estimator::Direct => 0,
-            Estimator::Paper => 1,
+            Estimator::Direct => ESTIMATOR_DIRECT,
+            Estimator::Paper => ESTIMATOR_PAPER,
         };
         frame.exposure_scale = match settings.exposure {
             Exposure::Ev(ev) => ev.exp2() as f32,

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec2, Vec3};
 use super::{
     FRAME_LIGHTS_SUFFICE, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD,
     LIGHT_SPOT, LIGHT_TRIANGLE, Light, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT, Material, NONE,
-    PackedScene, TEXTURE_UV1,
+    PackedScene, SIDE_REAL, SIDE_VIRTUAL, TEXTURE_UV1,
 };
 use crate::light::rectangle::is_rectangle;
 use crate::material::texture_sample;
@@ -40,7 +40,10 @@ pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
     let radius = scene_radius(packed);
     let anchor = DVec3::from(packed.anchor_m);
     for light in &scene.lights {
-        let side = u32::from(light.side == Side::Virtual);
+        let side = match light.side {
+            Side::Real => SIDE_REAL,
+            Side::Virtual => SIDE_VIRTUAL,
+        };
         let (record, power) = pack_light(&light.kind, side, anchor, radius);
         lights.push(record);
         powers.push(power);
@@ -49,7 +52,7 @@ pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
     packed.frame.env_light = NONE;
     if packed.env_mean_luminance > 0.0 {
         packed.frame.env_light = lights.len() as u32;
-        lights.push(blank(LIGHT_ENVIRONMENT, 0));
+        lights.push(blank(LIGHT_ENVIRONMENT, SIDE_REAL));
         powers.push(packed.env_mean_luminance * std::f64::consts::PI.powi(2) * radius * radius);
     }
     set_probabilities(&mut lights, &powers);

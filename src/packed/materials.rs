@@ -7,7 +7,7 @@ use super::{
     MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
     MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, Material, NONE,
     PackedScene, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1, TEXTURE_WRAP_U_SHIFT,
-    TEXTURE_WRAP_V_SHIFT, TextureRef,
+    TEXTURE_WRAP_V_SHIFT, TextureRef, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT,
 };
 use crate::scene::{self, AlphaMode, Texture, Wrap};
 
@@ -114,9 +114,9 @@ impl MaterialTable {
                 (texture.clone(), offset)
             });
         let wrap = |w: Wrap| match w {
-            Wrap::Repeat => 0,
-            Wrap::Mirror => 1,
-            Wrap::Clamp => 2,
+            Wrap::Repeat => WRAP_REPEAT,
+            Wrap::Mirror => WRAP_MIRROR,
+            Wrap::Clamp => WRAP_CLAMP,
         };
         let bit = |on: bool, bit: u32| if on { bit } else { 0 };
         let [a, b, c, d, e, f] = r.transform;

@@ -9,10 +9,9 @@ use rayon::prelude::*;
 
 use crate::accel::{Hit, Ray};
 use crate::camera::lens::camera_ray;
-use crate::cpu::contribution::ESTIMATOR_DIRECT;
 use crate::cpu::render::render_first_hit;
 use crate::packed::{
-    FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, Frame,
+    ESTIMATOR_DIRECT, FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, Frame,
     MATERIAL_PHOTO_ALBEDO, NONE, PackedScene,
 };
 use crate::scene::Photo;

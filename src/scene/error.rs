@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Why a scene was refused. Displays as one line.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
-    /// The scene file itself cannot be read.
+    /// The scene file, or a file that it names, cannot be read.
     #[error(
         "{}: the scene file cannot be read ({reason}); expected a TOML file; correct the path",
         path.display()

@@ -16,6 +16,7 @@ use super::shutter::{read_camera_motion, read_shutter};
 use super::trajectory::Intrinsics;
 use super::{Photo, Scene, Stages};
 use crate::decode::{MAX_TEXT_BYTES, read_file};
+use crate::files;
 
 const TABLES: &[&str] = &[
     "photo",
@@ -88,6 +89,12 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
     lights.extend(mesh_lights);
     let mut inputs = source.files.borrow().clone();
     inputs.extend(mesh_files);
+    for path in &inputs {
+        files::input(path).map_err(|error| SceneError::Unreadable {
+            path: path.clone(),
+            reason: error.to_string(),
+        })?;
+    }
     Ok(Scene {
         name: scene_name(&source.path),
         path: source.path.clone(),

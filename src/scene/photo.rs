@@ -19,7 +19,10 @@ pub(super) fn read_photo(
         return Ok((given, Exposure::Ev(0.0)));
     };
     let photo = match given {
-        Some(photo) => Some(photo),
+        Some(photo) => {
+            table.optional("image", Node::note_file)?;
+            Some(photo)
+        }
         None => table.optional("image", |node| read_photo_image(node, warnings))?,
     };
     let exposure = table.optional("exposure_ev", |node| read_exposure(node, photo.is_some()))?;

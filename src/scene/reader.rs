@@ -252,6 +252,15 @@ impl<'a> Node<'a> {
         ))
     }
 
+    /// Notes the file that this string names, if there is one: it is not read, but belongs to the scene.
+    pub fn note_file(&self) -> Result<()> {
+        let path = self.source.resolve(self.string()?);
+        if path.is_file() {
+            self.source.files.borrow_mut().push(path);
+        }
+        Ok(())
+    }
+
     /// An error of a file that this string names; `problem` reads "problem; expected ...; how to mend".
     pub fn file_error(&self, path: &Path, problem: &str) -> SceneError {
         let message = format!("`{}` {}: {problem}", self.label, path.display());

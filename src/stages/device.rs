@@ -5,6 +5,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::STAGES;
 use crate::gpu::kernel::Kernel;
 use crate::gpu::{Composer, Features, GpuDevice, GpuError};
 
@@ -21,11 +22,19 @@ pub struct GpuStages {
     kernels: Mutex<HashMap<KernelName, Arc<Kernel>>>,
 }
 
+/// The shaders with what the stages declare.
+pub(super) fn composer() -> Composer {
+    let declared = STAGES.iter().flat_map(|stage| stage.declared);
+    declared.fold(Composer::default(), |composer, module| {
+        composer.with_shared(module)
+    })
+}
+
 impl GpuStages {
     pub fn new(gpu: Arc<GpuDevice>) -> Self {
         Self {
             gpu,
-            composer: Composer::default(),
+            composer: composer(),
             kernels: Mutex::default(),
         }
     }

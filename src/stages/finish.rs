@@ -10,11 +10,14 @@ use super::{GpuStages, STAGES};
 use crate::film::{Film, Means, Picture};
 use crate::gpu::GpuError;
 use crate::scene::Scene;
+use crate::shared::Module;
 
 /// A stage as it is applied to a shot.
 pub(super) struct Stage {
     /// That of its table in a scene file.
     pub name: &'static str,
+    /// What its files declare for their shaders too.
+    pub declared: &'static [&'static Module],
     /// Whether it has something to do; it is not run otherwise.
     pub wants: fn(&Shot) -> bool,
     /// Runs on the device if there is one; only then it can fail, and it leaves the shot as it was.

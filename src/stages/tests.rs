@@ -1,9 +1,11 @@
 use wgpu::naga;
 
 use super::STAGES;
+use super::device::composer;
 use super::settings::Stages;
+use crate::gpu::Features;
 use crate::gpu::compose::MODULES;
-use crate::gpu::{Composer, Features};
+use crate::gpu::layout_test::differences;
 
 /// Module and name of every entry point below `shaders/stages/`.
 fn kernels() -> Vec<(&'static str, String)> {
@@ -26,7 +28,7 @@ fn every_kernel_is_valid() {
     let kernels = kernels();
     assert!(kernels.len() > STAGES.len(), "{kernels:?}");
     for (module, kernel) in kernels {
-        let wgsl = Composer::default()
+        let wgsl = composer()
             .compose(module, &kernel, &Features::default())
             .unwrap_or_else(|error| panic!("{kernel}: {error}"));
         let parsed = naga::front::wgsl::parse_str(&wgsl)
@@ -37,6 +39,18 @@ fn every_kernel_is_valid() {
         );
         if let Err(error) = validator.validate(&parsed) {
             panic!("{kernel}: {}", error.emit_to_string(&wgsl));
+        }
+    }
+}
+
+/// That another value would be noticed is shown beside [`differences`].
+#[test]
+fn what_is_declared_is_the_same_on_both_sides() {
+    for stage in STAGES {
+        for declared in stage.declared {
+            assert!(!declared.constants.is_empty() || !declared.records.is_empty());
+            let found = differences(composer(), declared);
+            assert!(found.is_empty(), "{}: {found:?}", declared.path());
         }
     }
 }

@@ -3,6 +3,7 @@
 mod sink;
 mod source;
 mod y4m;
+mod y4m_file;
 mod yuv;
 
 pub use sink::{FrameSink, SinkPlan};

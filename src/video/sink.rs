@@ -1,17 +1,24 @@
 //! Where frames go: a folder of PNG files, a Y4M file, or a Y4M stream on standard output.
 //!
 //! What is finished stays: a PNG file is written beside its place and renamed, a Y4M file grows under another name until it is whole.
-//! Both carry a fingerprint of the render, so that one that goes on after an interruption takes no other's frames for its own.
+//! Both carry a fingerprint of the render, so that one that goes on after an interruption takes no other's frames for its own. What a
+//! power cut or a bad disk has damaged does not count as finished.
 
-use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::collections::HashSet;
+use std::ffi::{OsStr, OsString};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::y4m::Header;
+use super::y4m_file::{Paths, Y4mFile, write_frame};
 use super::yuv::encode_yuv;
 use super::{Pixels, Place, VideoError, VideoFrame};
+use crate::files::{self, final_target};
 use crate::film::Picture;
-use crate::output::{PngBits, Target, picture_codes8, write_bytes, write_png, write_text};
+use crate::output::{
+    Format, OutputError, PNG_END, PngBits, Target, check_named, check_writable, cut,
+    picture_codes8, remove_leftovers, write_bytes, write_png, write_text,
+};
 use crate::scene::trajectory::FrameName;
 use crate::scene::{EncodedPhoto, Photo};
 
@@ -29,32 +36,25 @@ pub struct SinkPlan<'a> {
     pub png_bits: Option<PngBits>,
     /// Frames of another render are replaced.
     pub overwrite: bool,
+    /// The frames to come, where they are known.
+    pub names: Vec<FrameName>,
 }
 
 pub struct FrameSink {
     kind: Kind,
     png_bits: Option<PngBits>,
     header: Header,
-    written: u32,
 }
 
 enum Kind {
     Folder(PathBuf),
-    Y4mFile {
-        file: BufWriter<File>,
-        /// Whole frames that were there before.
-        there: u32,
-        part: PathBuf,
-        path: PathBuf,
-    },
-    /// The file is whole already.
-    Whole,
+    Y4mFile(Y4mFile),
     Stdout(BufWriter<std::io::Stdout>),
 }
 
 impl FrameSink {
     /// # Errors
-    /// It cannot be written, or holds frames of another render.
+    /// It cannot be written, holds frames of another render, or files that are read.
     pub fn open(plan: SinkPlan<'_>) -> Result<Self, VideoError> {
         let kind = if plan.path == Path::new("-") {
             let mut out = BufWriter::new(std::io::stdout());
@@ -63,30 +63,31 @@ impl FrameSink {
             sent.map_err(|error| Place::Stdout.error(cannot_write(&error)))?;
             Kind::Stdout(out)
         } else if plan.path.extension().is_some_and(|e| e == "y4m") {
-            open_y4m(&plan)?
+            Kind::Y4mFile(open_y4m(&plan)?)
         } else {
-            open_folder(&plan)?;
-            Kind::Folder(plan.path.into())
+            Kind::Folder(open_folder(&plan)?)
         };
         Ok(Self {
             kind,
             png_bits: plan.png_bits,
             header: plan.header,
-            written: 0,
         })
     }
 
-    /// The frame, the next in order, is finished from an earlier run. Asked once for each.
-    pub fn has(&mut self, name: &FrameName) -> bool {
-        match &self.kind {
-            Kind::Folder(folder) => png_path(folder, name).is_file(),
-            Kind::Y4mFile { there, .. } => {
-                let has = self.written < *there;
-                self.written += u32::from(has);
-                has
+    /// The frame, the next in order, is finished from an earlier run, and whole. Asked once for each, before it is written; `frame` is what
+    /// came in.
+    ///
+    /// # Errors
+    /// Its file is one that is read, or that of another frame.
+    pub fn has(&mut self, name: &FrameName, frame: &VideoFrame) -> Result<bool, VideoError> {
+        match &mut self.kind {
+            Kind::Folder(folder) => {
+                let path = png_path(folder, name);
+                check_named(&path)?;
+                Ok(is_whole(&path, frame))
             }
-            Kind::Whole => true,
-            Kind::Stdout(_) => false,
+            Kind::Y4mFile(file) => file.has_next(),
+            Kind::Stdout(_) => Ok(false),
         }
     }
 
@@ -101,7 +102,7 @@ impl FrameSink {
         frame: &VideoFrame,
     ) -> Result<(), VideoError> {
         if let Kind::Folder(folder) = &self.kind {
-            let target = Target::picture(&png_path(folder, name))?;
+            let target = Target::named(&png_path(folder, name), Format::Png);
             let photo = Some(&frame.photo);
             let bits = self.png_bits.unwrap_or_else(|| PngBits::for_photo(photo));
             return Ok(write_png(&target, picture, photo, bits)?);
@@ -136,7 +137,7 @@ impl FrameSink {
                 })?;
                 Ok(write_bytes(&png_path(folder, name), &bytes)?)
             }
-            (Kind::Y4mFile { .. } | Kind::Stdout(_), Pixels::Planes(planes)) => {
+            (Kind::Y4mFile(_) | Kind::Stdout(_), Pixels::Planes(planes)) => {
                 self.write_planes(planes)
             }
             _ => {
@@ -153,16 +154,13 @@ impl FrameSink {
     }
 
     fn write_planes(&mut self, planes: &[u8]) -> Result<(), VideoError> {
-        self.written += 1;
-        let (out, place): (&mut dyn Write, Place) = match &mut self.kind {
-            Kind::Y4mFile { file, part, .. } => (file, Place::File(part.clone())),
-            Kind::Stdout(out) => (out, Place::Stdout),
-            Kind::Folder(_) | Kind::Whole => return Ok(()),
-        };
-        out.write_all(b"FRAME\n")
-            .and_then(|()| out.write_all(planes))
-            .and_then(|()| out.flush())
-            .map_err(|error| place.error(cannot_write(&error)))
+        match &mut self.kind {
+            Kind::Y4mFile(file) => file.write(planes),
+            Kind::Stdout(out) => {
+                write_frame(out, planes).map_err(|error| Place::Stdout.error(cannot_write(&error)))
+            }
+            Kind::Folder(_) => Ok(()),
+        }
     }
 
     /// All frames are there: a Y4M file gets its name.
@@ -170,19 +168,17 @@ impl FrameSink {
     /// # Errors
     /// It cannot be renamed.
     pub fn finish(self) -> Result<(), VideoError> {
-        if let Kind::Y4mFile {
-            file, part, path, ..
-        } = self.kind
-        {
-            drop(file);
-            std::fs::rename(&part, &path)
-                .map_err(|error| Place::File(path).error(cannot_write(&error)))?;
+        match self.kind {
+            Kind::Y4mFile(file) => file.finish(),
+            Kind::Folder(_) | Kind::Stdout(_) => Ok(()),
         }
-        Ok(())
     }
 }
 
-fn cannot_write(error: &std::io::Error) -> String {
+pub(super) fn cannot_write(error: &std::io::Error) -> String {
+    if error.kind() == std::io::ErrorKind::BrokenPipe {
+        return "it was closed before the last frame; expected a reader to the end; see why the program behind the pipe ended".to_owned();
+    }
     format!(
         "it cannot be written ({error}); expected room for the frames; make room, then go on with the same command"
     )
@@ -201,78 +197,159 @@ fn png_path(folder: &Path, name: &FrameName) -> PathBuf {
 }
 
 /// Frames of another render are there.
-fn foreign(path: &Path) -> VideoError {
+pub(super) fn foreign(path: &Path) -> VideoError {
     Place::File(path.into()).error(
         "it holds frames of another render (another scene, trajectory or option, or none of this program's); expected a new place or the same render; name another, or replace them with --overwrite",
     )
 }
 
-fn open_folder(plan: &SinkPlan<'_>) -> Result<(), VideoError> {
-    let folder = plan.path;
-    let place = Place::File(folder.into());
-    std::fs::create_dir_all(folder).map_err(|error| {
+/// The folder, links resolved.
+fn open_folder(plan: &SinkPlan<'_>) -> Result<PathBuf, VideoError> {
+    let folder = final_target(plan.path);
+    let place = Place::File(plan.path.into());
+    files::output(plan.path).map_err(OutputError::from)?;
+    for name in &plan.names {
+        files::check_output(&png_path(&folder, name)).map_err(OutputError::from)?;
+    }
+    std::fs::create_dir_all(&folder).map_err(|error| {
         place.error(format!("it cannot be made ({error}); expected a folder for the frames, a file that ends in .y4m, or -; name another"))
     })?;
     let note_path = folder.join(NOTE);
+    check_writable(&note_path)?;
+    let own: HashSet<OsString> = (plan.names.iter())
+        .filter_map(|name| Some(cut(png_path(&folder, name).file_name()?)))
+        .collect();
+    remove_leftovers(&folder, |output| match own.is_empty() {
+        true => is_numbered(output),
+        false => own.contains(output),
+    });
     let note = format!("{{\n  \"fingerprint\": \"{}\"\n}}\n", plan.fingerprint);
     if std::fs::read_to_string(&note_path).is_ok_and(|text| text == note) {
-        return Ok(());
+        return Ok(folder);
     }
-    let entries = std::fs::read_dir(folder).map_err(|error| place.error(cannot_write(&error)))?;
-    for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
-        if path.extension().is_some_and(|e| e == "png") {
-            if !plan.overwrite {
-                return Err(foreign(folder));
-            }
-            std::fs::remove_file(&path)
-                .map_err(|error| Place::File(path).error(cannot_write(&error)))?;
+    let entries = std::fs::read_dir(&folder).map_err(|error| place.error(cannot_write(&error)))?;
+    let others: Vec<PathBuf> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|e| e == "png"))
+        .collect();
+    if !others.is_empty() && !plan.overwrite {
+        return Err(foreign(plan.path));
+    }
+    for path in &others {
+        files::before_write(path).map_err(OutputError::from)?;
+    }
+    for path in others {
+        std::fs::remove_file(&path)
+            .map_err(|error| Place::File(path).error(cannot_write(&error)))?;
+    }
+    write_text(&note_path, &note)?;
+    Ok(folder)
+}
+
+/// What a frame without a name of its own is called.
+fn is_numbered(name: &OsStr) -> bool {
+    let number = (name.to_str())
+        .and_then(|name| name.strip_prefix("frame_")?.strip_suffix(".png"))
+        .and_then(|number| number.parse().ok());
+    number.is_some_and(|number: u32| *name == *format!("frame_{number:06}.png"))
+}
+
+/// A picture of the frame's size to its last byte, or the frame's own file.
+fn is_whole(path: &Path, frame: &VideoFrame) -> bool {
+    let Ok(bytes) = std::fs::read(path) else {
+        return false;
+    };
+    let is_own = |own: &PathBuf| std::fs::read(own).is_ok_and(|own| own == bytes);
+    if matches!(&frame.pixels, Pixels::File(own) if is_own(own)) {
+        return true;
+    }
+    bytes.ends_with(&PNG_END)
+        && Photo::decode(&bytes).is_ok_and(|(photo, _)| {
+            (photo.width, photo.height) == (frame.photo.width, frame.photo.height)
+        })
+}
+
+fn open_y4m(plan: &SinkPlan<'_>) -> Result<Y4mFile, VideoError> {
+    let path = final_target(plan.path);
+    let part = path.with_extension("y4m.part");
+    check_writable(plan.path)?;
+    check_writable(&part)?;
+    // The fingerprint stands in the header, where other programs pass it by.
+    let line = format!("{} XMIXRAY={}", plan.header.line, plan.fingerprint);
+    Y4mFile::open(
+        Paths { path, part },
+        &line,
+        plan.header.frame_bytes(),
+        plan.names.len() as u32,
+        plan.overwrite,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(codes: [u8; 3], pixels: Pixels) -> VideoFrame {
+        VideoFrame {
+            photo: Photo::from_srgb8(5, 4, vec![codes; 20]),
+            pixels,
+            warnings: Vec::new(),
         }
     }
-    Ok(write_text(&note_path, &note)?)
-}
 
-/// The fingerprint stands in the header, where other programs pass it by.
-fn open_y4m(plan: &SinkPlan<'_>) -> Result<Kind, VideoError> {
-    let line = format!("{} XMIXRAY={}", plan.header.line, plan.fingerprint);
-    let path = plan.path.to_path_buf();
-    if path.exists() && !plan.overwrite {
-        return match first_line(&path).is_some_and(|first| first == line) {
-            true => Ok(Kind::Whole),
-            false => Err(foreign(&path)),
+    /// No byte of a finished frame can be lost or changed unseen.
+    #[test]
+    fn every_damage_to_a_frame_is_seen() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("f.png");
+        let frame = frame([9, 8, 7], Pixels::Jpeg);
+        let picture = Picture {
+            width: 5,
+            height: 4,
+            linear: frame.photo.linear.clone(),
         };
+        let target = Target::named(&path, Format::Png);
+        for bits in [PngBits::Eight, PngBits::Sixteen] {
+            write_png(&target, &picture, None, bits).unwrap();
+            assert!(is_whole(&path, &frame), "control");
+            let whole = std::fs::read(&path).unwrap();
+            for length in 0..whole.len() {
+                std::fs::write(&path, &whole[..length]).unwrap();
+                assert!(!is_whole(&path, &frame), "{length} bytes");
+            }
+            for bit in 0..8 * whole.len() {
+                let mut bytes = whole.clone();
+                bytes[bit / 8] ^= 1 << (bit % 8);
+                std::fs::write(&path, bytes).unwrap();
+                assert!(!is_whole(&path, &frame), "bit {bit}");
+            }
+        }
+        std::fs::remove_file(&path).unwrap();
+        assert!(!is_whole(&path, &frame));
     }
-    let part = path.with_extension("y4m.part");
-    let failed = |error: std::io::Error| Place::File(part.clone()).error(cannot_write(&error));
-    if part.exists() && !plan.overwrite && first_line(&part).is_none_or(|first| first != line) {
-        return Err(foreign(&part));
-    }
-    let mut file = (OpenOptions::new().read(true).write(true).create(true))
-        .truncate(plan.overwrite)
-        .open(&part)
-        .map_err(failed)?;
-    let begin = line.len() as u64 + 1;
-    let frame = plan.header.frame_bytes() as u64 + 6;
-    let length = file.metadata().map_err(failed)?.len();
-    let there = length.saturating_sub(begin) / frame;
-    if length < begin {
-        file.set_len(0).map_err(failed)?;
-        file.write_all(format!("{line}\n").as_bytes())
-            .map_err(failed)?;
-    }
-    // A frame that was being written when the program ended goes.
-    file.set_len(begin + there * frame).map_err(failed)?;
-    file.seek(SeekFrom::End(0)).map_err(failed)?;
-    Ok(Kind::Y4mFile {
-        file: BufWriter::new(file),
-        there: there as u32,
-        part,
-        path,
-    })
-}
 
-fn first_line(path: &Path) -> Option<String> {
-    let mut line = String::new();
-    let file = File::open(path).ok()?;
-    BufReader::new(file.take(4096)).read_line(&mut line).ok()?;
-    Some(line.strip_suffix('\n')?.to_owned())
+    /// A frame that was passed through may be any file that its reader takes.
+    #[test]
+    fn a_copy_of_the_frame_is_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let frame = frame([9, 8, 7], Pixels::File(at("in.png")));
+        std::fs::write(at("in.png"), "bytes and some more").unwrap();
+        std::fs::write(at("out.png"), "bytes and some more").unwrap();
+        assert!(is_whole(&at("out.png"), &frame));
+        std::fs::write(at("out.png"), "bytes and some").unwrap();
+        assert!(!is_whole(&at("out.png"), &frame));
+    }
+
+    #[test]
+    fn numbered_frames_are_known_by_their_names() {
+        for (name, is) in [
+            ("frame_000012.png", true),
+            ("frame_1234567.png", true),
+            ("frame_12.png", false),
+            ("frame_000012.exr", false),
+        ] {
+            assert_eq!(is_numbered(OsStr::new(name)), is, "{name}");
+        }
+    }
 }

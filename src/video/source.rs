@@ -1,6 +1,5 @@
 //! Where frames come from.
 
-use std::fs::File;
 use std::io::{BufReader, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -9,6 +8,7 @@ use super::y4m::{Header, Y4mReader};
 use super::yuv::decode_yuv;
 use super::{Place, VideoError};
 use crate::decode::{read_stream, split_jpegs};
+use crate::files;
 use crate::scene::Photo;
 use crate::scene::trajectory::{FrameName, trailing_number};
 
@@ -63,6 +63,7 @@ impl FrameSource {
     /// Nothing of the kind is there.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let kind = if path == Path::new("-") {
+            files::standard_input().map_err(|error| Place::Stdin.error(error.to_string()))?;
             let input: Box<dyn Read> = Box::new(BufReader::new(std::io::stdin()));
             Kind::Y4m(Box::new(Y4mReader::new(input, Place::Stdin)?))
         } else if path.is_dir() {
@@ -189,7 +190,8 @@ fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
             format!("it cannot be read ({error}); expected a folder of frames; correct the rights"),
         )
     };
-    let mut files = Vec::new();
+    let mut pictures = Vec::new();
+    files::input(folder).map_err(unreadable)?;
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
         let extension = path.extension().map(|e| e.to_ascii_lowercase());
@@ -200,21 +202,22 @@ fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
             continue;
         };
         if is_picture && !name.starts_with('.') {
-            files.push((name.to_owned(), path));
+            files::input(&path).map_err(unreadable)?;
+            pictures.push((name.to_owned(), path));
         }
     }
-    if files.is_empty() {
+    if pictures.is_empty() {
         return Err(file_error(
             folder,
             "it holds no picture; expected frames as PNG, JPEG, EXR or HDR; name another folder",
         ));
     }
-    files.sort();
-    let numbers: Option<Vec<u32>> = files
+    pictures.sort();
+    let numbers: Option<Vec<u32>> = pictures
         .iter()
         .map(|(name, _)| trailing_number(name))
         .collect();
-    let mut named: Vec<(FrameName, PathBuf)> = files
+    let mut named: Vec<(FrameName, PathBuf)> = pictures
         .into_iter()
         .enumerate()
         .map(|(index, (name, path))| {
@@ -253,7 +256,7 @@ fn open_file(path: &Path) -> Result<Kind, VideoError> {
             ),
         )
     };
-    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let mut file = BufReader::new(files::open(path).map_err(unreadable)?);
     let mut start = Vec::new();
     (&mut file)
         .take(2)

@@ -145,7 +145,6 @@ mod tests {
                 is_virtual,
                 contribution: Vec3::ONE,
                 real: None,
-                guide: None,
             };
             film.add(1, &sample(index == 0));
             film.add(2, &sample(false));

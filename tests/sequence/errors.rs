@@ -41,7 +41,7 @@ fn poses_and_frames_that_do_not_fit_are_refused() {
         "no frame of the range",
     );
     folder.save_frame("in/f_0002.png", 48, 36, 2);
-    folder.refuse_sequence(&["--frames", "in", "-o", "in"], "would be replaced");
+    folder.refuse_sequence(&["--frames", "in", "-o", "in"], "would be overwritten");
     folder.refuse_sequence(&["--frames", "none", "-o", "out"], "none");
     folder.refuse_sequence(&["-o", "out"], "--frames is absent");
     folder.save_frame("in/g_0002.png", 48, 36, 2);

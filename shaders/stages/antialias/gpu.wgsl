@@ -2,13 +2,6 @@
 
 import package::stages::antialias::blended;
 
-struct AntialiasParams {
-    width: u32,
-    height: u32,
-    beta: f32,
-    pad: u32,
-}
-
 @group(0) @binding(0) var<uniform> params: AntialiasParams;
 // Linear, three words a pixel.
 @group(0) @binding(1) var<storage, read> source: array<f32>;

@@ -6,35 +6,6 @@ import package::stages::cartoon::flow::{across, along, blurred, minor_eigenvecto
 import package::stages::cartoon::planes::{rgb_from_yuv, yuv_at};
 import package::stages::cartoon::simplify::{filter_, shrink, simplified_at};
 
-struct CartoonParams {
-    width: u32,
-    height: u32,
-    small_width: u32,
-    small_height: u32,
-    // -1 / (2 sigma_p^2)
-    factor: f32,
-    alpha: f32,
-    beta: f32,
-    s0: f32,
-    s1: f32,
-    a0: f32,
-    a1: f32,
-    // 1: `lines` hold the silhouettes.
-    flow: u32,
-}
-
-struct FlowParams {
-    // Weights of each half Gaussian stand in `weights`, one after the other: tensor, inner, outer, line.
-    tensor_count: u32,
-    inner_count: u32,
-    outer_count: u32,
-    line_count: u32,
-    tau: f32,
-    t0: f32,
-    t1: f32,
-    pad: u32,
-}
-
 @group(0) @binding(0) var<uniform> params: CartoonParams;
 // Encoded, clamped to 0..=1, three words a pixel.
 @group(0) @binding(1) var<storage, read> image: array<f32>;

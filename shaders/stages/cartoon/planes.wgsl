@@ -1,10 +1,7 @@
 // Twin of src/stages/cartoon/planes.rs.
 
+import package::stages::cartoon::{LUMA, U_MAX, V_MAX};
 import package::stages::cartoon::gpu::{image, params};
-
-const LUMA: vec3<f32> = vec3<f32>(0.299, 0.587, 0.114);
-const U_MAX: f32 = 0.436;
-const V_MAX: f32 = 0.615;
 
 fn yuv_from_rgb(rgb: vec3<f32>) -> vec3<f32> {
     let y = LUMA.x * rgb.x + LUMA.y * rgb.y + LUMA.z * rgb.z;

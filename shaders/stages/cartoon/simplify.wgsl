@@ -1,12 +1,7 @@
 // Twin of src/stages/cartoon/simplify.rs.
 
 import package::stages::cartoon::gpu::{params, simplified};
-import package::stages::cartoon::planes::{rgb_at, yuv_from_rgb};
-
-const REACH: i32 = 2;
-const LEAST_EXPONENT: f32 = -80.0;
-const LOG2_E: f32 = 1.44269504;
-const LN_2: f32 = 0.693147181;
+import package::stages::cartoon::planes::{rgb_at, yuv_from_rgb, PAD};
 
 fn overlap(part: u32, pixel: u32, large: u32, small: u32) -> f32 {
     let covered = min((part + 1u) * large, (pixel + 1u) * small) - max(part * large, pixel * small);
@@ -35,8 +30,9 @@ fn filter_(x: i32, y: i32) -> vec3<f32> {
     let center = simplified_at(x, y);
     var sum = vec3<f32>(0.0);
     var norm = 0.0;
-    for (var dy = -REACH; dy <= REACH; dy++) {
-        for (var dx = -REACH; dx <= REACH; dx++) {
+    let reach = i32(PAD);
+    for (var dy = -reach; dy <= reach; dy++) {
+        for (var dx = -reach; dx <= reach; dx++) {
             let near = simplified_at(x + dx, y + dy).xyz;
             let du = near.y - center.y;
             let dv = near.z - center.z;

@@ -2,19 +2,6 @@
 
 import package::stages::motion_blur::copies::{layer_at, over};
 
-struct CopiesParams {
-    width: u32,
-    height: u32,
-    count: u32,
-    opacity: f32,
-    start: vec2<f32>,
-    step: vec2<f32>,
-    centre_opacity: f32,
-    pad_0: u32,
-    pad_1: u32,
-    pad_2: u32,
-}
-
 @group(0) @binding(0) var<uniform> params: CopiesParams;
 // Linear colour times coverage, and coverage.
 @group(0) @binding(1) var<storage, read> layer: array<vec4<f32>>;

@@ -2,9 +2,7 @@
 
 import package::math::{hash_combine, log_, sincos_2pi, uniform_from_bits};
 import package::stages::noise::gpu::{params, weights, white};
-
-const MARGIN: u32 = 16u;
-const KERNEL_SIDE: u32 = 7u;
+import package::stages::noise::kernel::KERNEL_SIDE;
 
 fn mixed(x: u32, y: u32) -> vec3<f32> {
     let deviates = white_deviates(params.seed, params.frame, x, y);

@@ -6,26 +6,6 @@ import package::stages::noise::missing::missing_sigma;
 import package::stages::noise::textures::variation;
 import package::stages::noise::is_untouched;
 
-struct NoiseParams {
-    width: u32,
-    height: u32,
-    bins: u32,
-    seed: u32,
-    frame: u32,
-    // 0: the noise is white, else 3.
-    reach: u32,
-    has_photo: u32,
-    texture_size: u32,
-    scale: f32,
-    magnification: f32,
-    rotation_sin: f32,
-    rotation_cos: f32,
-    offset_x: f32,
-    offset_y: f32,
-    pad0: u32,
-    pad1: u32,
-}
-
 @group(0) @binding(0) var<uniform> params: NoiseParams;
 // Linear, three words a pixel; so are photo, ratio and variance.
 @group(0) @binding(1) var<storage, read_write> picture: array<f32>;

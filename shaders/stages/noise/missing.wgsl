@@ -1,9 +1,8 @@
 // Twin of src/stages/noise/missing.rs.
 
 import package::stages::curve::{decode_slope, encode_rgb};
+import package::stages::noise::BIN_SHIFT;
 import package::stages::noise::gpu::{mask, params, photo, ratio, variance, weights};
-
-const BIN_SHIFT: f32 = 0.01;
 
 fn sigma_of(encoded: vec3<f32>) -> vec3<f32> {
     let bin = bin_of(encoded);

@@ -2,6 +2,7 @@
 
 use super::super::chi_squared::{assert_uniform, critical, statistic};
 use super::*;
+use crate::packed::SAMPLER_SOBOL;
 
 const SAMPLERS: [(&str, u32); 3] = [
     ("jittered", SAMPLER_JITTERED),

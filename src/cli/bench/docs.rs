@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::files::read_text;
 use crate::bench::replace_section;
 use crate::cli::Failure;
+use crate::files;
 use crate::output::write_text;
 
 /// A page with a section for this table.
@@ -16,7 +16,10 @@ pub(super) struct Docs {
 
 impl Docs {
     pub(super) fn open(path: &Path, section: &'static str) -> Result<Self, Failure> {
-        let page = read_text(path)?;
+        files::output(path)?;
+        // Not as an input: the page is only read to be written again.
+        let page = std::fs::read_to_string(path)
+            .map_err(|error| Failure(format!("{}: {error}", path.display())))?;
         if replace_section(&page, section, "").is_none() {
             return Err(Failure(format!(
                 "{}: has no section <!-- {section} --> ... <!-- end -->",

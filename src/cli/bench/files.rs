@@ -8,7 +8,7 @@ use super::command_line;
 use crate::bench::{Axis, FORMAT, Machine, Plot, Report, Shot, Truth, csv, page, plots};
 use crate::cli::{Failure, say};
 use crate::decode::{self, MAX_TEXT_BYTES};
-use crate::output::{write_bytes, write_text};
+use crate::output::quick::{write_bytes, write_text};
 use crate::scene::Composite;
 
 /// All that a scene's pictures are shown with.

@@ -9,6 +9,7 @@ use crate::bench::{Machine, Method, Plan, shrink};
 use crate::cli::threads::ThreadsFlag;
 use crate::cli::values::{choice, rays_per_pixel};
 use crate::cli::{Failure, Outcome, say};
+use crate::files;
 use crate::scene::{self, BackendChoice, Composite, Estimator, SamplerKind, Scene};
 
 /// Where figures go, and on how many threads they are made.
@@ -33,9 +34,13 @@ impl OutputFlags {
         Ok(docs)
     }
 
-    /// Makes the folder for what is written, once it is known that something will be.
-    pub(super) fn make_folder(&self) -> Result<&Path, Failure> {
+    /// Makes the folder for what is written, once it is known that something will be; `names` are files that will be in it.
+    pub(super) fn make_folder(&self, names: &[&str]) -> Result<&Path, Failure> {
         let folder = &self.output;
+        files::output(folder)?;
+        for name in names {
+            files::output(&folder.join(name))?;
+        }
         std::fs::create_dir_all(folder).map_err(|error| {
             Failure(format!(
                 "{}: {error}; expected a folder that can be made; give another with -o",

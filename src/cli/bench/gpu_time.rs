@@ -33,7 +33,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let machine = Machine::this(true);
     let interrupted = interrupt::watch()?;
     let scenes = load_scenes(&arguments.scenes, arguments.shrink, BackendChoice::Cpu)?;
-    let folder = arguments.output.make_folder()?;
+    let folder = arguments.output.make_folder(&["gpu-time.json"])?;
     let rays_per_pixel = arguments.rays.ascending();
     let steps = progress::Steps::new((scenes.len() * rays_per_pixel.len()) as u64);
     let mut times = Vec::new();

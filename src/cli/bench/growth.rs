@@ -8,7 +8,7 @@ use super::flags::{OutputFlags, RunFlags, finish, machine_of};
 use crate::bench::{Law, grow, growth_csv, growth_markdown, growth_plot, growth_text};
 use crate::cli::values::choice;
 use crate::cli::{Failure, Outcome, interrupt, print, progress};
-use crate::output::{write_bytes, write_text};
+use crate::output::quick::{write_bytes, write_text};
 use crate::renderer::Watcher;
 use crate::scene::Choice;
 
@@ -32,7 +32,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let methods = arguments.runs.methods(&machine);
     let named = machine_of(&machine, &methods);
     let plan = arguments.runs.plan(Vec::new(), methods, &machine);
-    let folder = arguments.output.make_folder()?;
+    let folder = arguments
+        .output
+        .make_folder(&["growth.json", "growth.csv"])?;
     let wanted = |law: &Law| arguments.laws.is_empty() || arguments.laws.contains(law);
     let laws: Vec<Law> = Law::CHOICES
         .iter()

@@ -10,7 +10,7 @@ use crate::bench::{
     picture_png, shrink,
 };
 use crate::cli::{Failure, Outcome, interrupt, print, progress};
-use crate::output::{write_bytes, write_text};
+use crate::output::quick::{write_bytes, write_text};
 use crate::renderer::Watcher;
 use crate::scene;
 
@@ -30,7 +30,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let machine = arguments.runs.machine();
     let methods = arguments.runs.methods(&machine);
     let named = machine_of(&machine, &methods);
-    let folder = arguments.output.make_folder()?;
+    let folder = arguments.output.make_folder(&["paper.json", "paper.png"])?;
     let path = folder.join("paper.toml");
     write_text(&path, PAPER_SCENE)?;
     let mut scene = shrink(scene::load(&path)?, arguments.runs.shrink);

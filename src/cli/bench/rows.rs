@@ -227,7 +227,14 @@ fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
         false => BackendChoice::Cpu,
     };
     let scenes = load_scenes(&arguments.scenes, arguments.runs.shrink, backend)?;
-    let folder = arguments.output.make_folder()?;
+    let plots = scenes.iter().flat_map(|scene| {
+        ["time.svg", "time.png", "rays.svg", "rays.png"]
+            .map(|axis| format!("{}-error-{axis}", scene.name))
+    });
+    let plots: Vec<String> = plots.collect();
+    let mut names = vec!["results.json", "results.csv", "index.html"];
+    names.extend(plots.iter().map(String::as_str));
+    let folder = arguments.output.make_folder(&names)?;
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
     let watcher = Watcher::none().cancelled_by(&cancelled);

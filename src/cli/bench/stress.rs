@@ -11,7 +11,7 @@ use crate::bench::stress::{Backend, Effort, Report, cases, csv, markdown, text};
 use crate::cli::values::choice;
 use crate::cli::{Failure, Outcome, interrupt, print, progress, say};
 use crate::gpu::{AdapterChoice, GpuDevice};
-use crate::output::write_text;
+use crate::output::quick::write_text;
 use crate::scene::BackendChoice;
 
 /// Numerical stability: a table of hard cases, each with the figure that it must hold against closed forms and f64 brute force; minutes
@@ -46,7 +46,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let docs = arguments.output.start("stress")?;
     let machine = Machine::this(arguments.backends.as_slice() != [BackendChoice::Cpu]);
     let mut backends = arguments.backends(&machine)?;
-    let folder = arguments.output.make_folder()?;
+    let folder = arguments
+        .output
+        .make_folder(&["stress.json", "stress.csv", "stress.md"])?;
     let interrupted = interrupt::watch()?;
     let cases = cases();
     let mut report = Report {

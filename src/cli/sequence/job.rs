@@ -1,6 +1,5 @@
 //! The frames one after the other.
 
-use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
@@ -11,6 +10,7 @@ use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
 use super::report::{Frames, Seconds, Stats};
 use crate::cli::progress::Steps;
 use crate::cli::render::say_idle;
+use crate::cli::terminal::print_aside;
 use crate::cli::{Failure, Outcome, interrupt, print, say};
 use crate::output::{check_writable, write_text};
 use crate::packed::next_anchor;
@@ -37,7 +37,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
                 .to_owned(),
         )
     })?;
-    refuse_same_place(frames, output)?;
     if let Some(path) = &arguments.flags.stats {
         check_writable(path)?;
     }
@@ -45,13 +44,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let rate = known_rate(arguments, &files.trajectory, Some(&source));
     let views = views(&files.trajectory, rate, source.is_stream())?;
     check_frames(arguments, &source, &views)?;
-    let count = source.names().map(|names| {
+    let names: Option<Vec<FrameName>> = source.names().map(|names| {
         names
-            .iter()
+            .into_iter()
             .filter(|name| in_range(arguments, name))
-            .count()
+            .collect()
     });
-    if let (Some((from, to)), None) = (arguments.focus_pull, &count)
+    if let (Some((from, to)), None) = (arguments.focus_pull, &names)
         && arguments.range.is_none()
     {
         return Err(Failure(format!(
@@ -59,13 +58,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         )));
     }
     let interrupted = interrupt::watch()?;
-    let bar = Steps::new(count.unwrap_or(0) as u64);
+    let names = names.unwrap_or_default();
+    let bar = Steps::new(names.len() as u64);
     let mut sequence = Sequence {
         arguments,
         files: &files,
         views: &views,
         rate,
         span: span(arguments, &source),
+        names,
         output,
         started: None,
         frames: Frames::default(),
@@ -107,20 +108,6 @@ fn span(arguments: &Arguments, source: &FrameSource) -> Option<(u32, u32)> {
     Some((names.first()?.number, names.last()?.number))
 }
 
-fn refuse_same_place(frames: &Path, output: &Path) -> Result<(), Failure> {
-    let same = match (frames.canonicalize(), output.canonicalize()) {
-        (Ok(frames), Ok(output)) => frames == output,
-        _ => false,
-    };
-    if !same {
-        return Ok(());
-    }
-    Err(Failure(format!(
-        "{}: the frames would be replaced; expected another place for the output; give another -o",
-        output.display()
-    )))
-}
-
 struct Sequence<'a> {
     arguments: &'a Arguments,
     files: &'a Files,
@@ -128,6 +115,8 @@ struct Sequence<'a> {
     /// Frames a second, where known.
     rate: Option<f64>,
     span: Option<(u32, u32)>,
+    /// The frames to come, where they are known.
+    names: Vec<FrameName>,
     output: &'a Path,
     started: Option<Started>,
     frames: Frames,
@@ -182,7 +171,7 @@ impl Sequence<'_> {
             // The same for every frame whichever run renders it.
             started.anchor = Some(next_anchor(started.anchor, position));
         }
-        let there = started.sink.has(name);
+        let there = started.sink.has(name, &frame)?;
         let Some(world_from_camera) = view.world_from_camera else {
             if there {
                 self.frames.kept += 1;
@@ -316,7 +305,9 @@ impl Sequence<'_> {
         scene.photo = None;
         let arguments = self.arguments;
         let fits = scene.settings.exposure == Exposure::Auto;
-        let scope = match fits || arguments.focus_pull.is_some() {
+        // A file tells by their order which frames it holds.
+        let is_file = self.output.extension().is_some_and(|e| e == "y4m");
+        let scope = match fits || arguments.focus_pull.is_some() || is_file {
             true => format!("{:?} {:?}", arguments.range, self.span),
             false => String::new(),
         };
@@ -343,6 +334,7 @@ impl Sequence<'_> {
             header: header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate)),
             png_bits: arguments.flags.png_bits,
             overwrite: arguments.overwrite,
+            names: self.names.clone(),
         })?;
         Ok(Started {
             sink,
@@ -384,8 +376,8 @@ impl Sequence<'_> {
         }
         let text = stats.text(&self.output.display().to_string());
         if self.output == Path::new("-") {
-            // Standard output is the film. Without a stderr there is nobody to tell.
-            let _ = std::io::stderr().write_all(text.as_bytes());
+            // Standard output is the film.
+            print_aside(&text);
         } else {
             print(&text)?;
         }

@@ -68,7 +68,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 fn positive(text: &str) -> Result<f64, &'static str> {
     match text.parse::<f64>() {
         Ok(x) if x > 0.0 && x <= 1e6 => Ok(x),
-        _ => Err("expected a number above 0"),
+        _ => Err("expected a number above 0, at most 1000000"),
     }
 }
 

@@ -81,13 +81,13 @@ pub fn measure(scene: &PackedScene, blocks: &Blocks) -> Vec<BlockMoments> {
 fn add_pixel(scene: &PackedScene, pixel: u32, index: u32, moments: &mut BlockMoments) {
     let [a, b] = [index, index + 1].map(|index| {
         let mut st = begin_sample(scene, pixel, index, false);
-        while st.stage != STAGE_DONE {
+        while st.path.stage != STAGE_DONE {
             answer(scene, &mut st);
             advance(scene, &mut st);
         }
         st
     });
-    let radiance = |st: &PathState| st.radiance * scene.frame.exposure_scale;
+    let radiance = |st: &PathState| st.result.radiance * scene.frame.exposure_scale;
     let mean_square = |x: Vec3| x.length_squared() / 3.0;
     let (x, y) = (radiance(&a), radiance(&b));
     if is_unusable(x) || is_unusable(y) {
@@ -99,7 +99,7 @@ fn add_pixel(scene: &PackedScene, pixel: u32, index: u32, moments: &mut BlockMom
         error,
         cost,
     };
-    match a.mask + b.mask {
+    match a.result.mask + b.result.mask {
         // The square, not the variance: it is what counting one sample for several multiplies.
         0 => moments.difference += sampled(0.5 * (mean_square(x) + mean_square(y))),
         1 => moments.mixed += sampled(EDGE_SHARE * 0.5 * mean_square(x - y)),

@@ -18,10 +18,9 @@ use blocks::Blocks;
 pub(crate) use importance::MAX_LIGHTS_EXAMINED;
 use importance::{PilotLights, importance};
 
-use super::contribution::ESTIMATOR_PAPER;
 use crate::packed::{
-    FRAME_AOVS, FRAME_BOTH_SHADOWS, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH,
-    PackedScene, PixelInfo,
+    ESTIMATOR_PAPER, FRAME_AOVS, FRAME_BOTH_SHADOWS, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL,
+    PIXEL_OUT_OF_REACH, PackedScene, PixelInfo,
 };
 
 /// Fewer rays per pixel than this are not worth a measurement.

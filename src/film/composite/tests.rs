@@ -1,7 +1,7 @@
 //! The composite against Eq. 4 evaluated in f64.
 
 use super::*;
-use crate::film::{Guide, Sample};
+use crate::film::{Sample, guide_add};
 
 struct Rng(u64);
 
@@ -49,7 +49,6 @@ fn film_of(rays: &[Ray]) -> Film {
                 is_virtual,
                 contribution: Vec3::splat(contribution as f32),
                 real: Some(Vec3::splat(ray.ir as f32)),
-                guide: None,
             },
         );
     }
@@ -167,7 +166,6 @@ fn untouched_pixels_keep_the_photograph_bit_for_bit() {
         is_virtual: false,
         contribution: Vec3::new(0.0, -0.0, x),
         real: Some(Vec3::splat(0.3)),
-        guide: None,
     };
     for _ in 0..7 {
         film.add(0, &sample(0.0));
@@ -294,25 +292,18 @@ fn variance_of_the_mean_is_that_of_independent_samples() {
 #[test]
 fn guides_are_means_over_hits() {
     let mut film = Film::new(2, 1, 0, true);
-    let sample = |guide| Sample {
+    let sample = Sample {
         is_virtual: false,
         contribution: Vec3::ZERO,
         real: None,
-        guide,
     };
     for (depth_m, normal) in [(1.0, Vec3::X), (2.0, Vec3::Y)] {
         let albedo = Vec3::splat(0.5);
-        film.add(
-            0,
-            &sample(Some(Guide {
-                depth_m,
-                normal,
-                albedo,
-            })),
-        );
+        film.add(0, &sample);
+        guide_add(&mut film.guides[0], depth_m, normal, albedo);
     }
-    film.add(0, &sample(None));
-    film.add(1, &sample(None));
+    film.add(0, &sample);
+    film.add(1, &sample);
     let p = planes(&film, None);
     assert_eq!(p.depth, [1.5, f32::INFINITY]);
     assert_eq!(p.albedo, [[0.5; 3], [0.0; 3]]);

@@ -2,7 +2,6 @@
 
 mod accepted;
 mod images;
-mod mutations;
 mod objects;
 mod refused;
 

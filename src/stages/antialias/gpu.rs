@@ -5,19 +5,18 @@ use bytemuck::{Pod, Zeroable};
 use super::AntialiasSettings;
 use crate::film::Picture;
 use crate::gpu::GpuError;
+use crate::shared::shared;
 use crate::stages::GpuStages;
 use crate::stages::antialias::is_binary;
 
-/// Of the shaders.
-const MODULE: &str = "stages::antialias::gpu";
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct AntialiasParams {
-    width: u32,
-    height: u32,
-    beta: f32,
-    pad: u32,
+shared! {
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    struct AntialiasParams {
+        width: u32,
+        height: u32,
+        beta: f32,
+        pad: u32,
+    }
 }
 
 impl GpuStages {
@@ -47,7 +46,7 @@ impl GpuStages {
         let mut encoder = self.encoder();
         self.dispatch(
             &mut encoder,
-            (MODULE, "stage_antialias"),
+            (SHARED.path(), "stage_antialias"),
             &[
                 ("params", &params),
                 ("source", &source),

@@ -19,6 +19,7 @@ pub use settings::AntialiasSettings;
 
 pub(super) const STAGE: Stage = Stage {
     name: "antialias",
+    declared: &[&gpu::SHARED],
     wants: |shot| shot.scene.stages.antialias.is_some(),
     run,
 };

@@ -84,6 +84,7 @@ fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, CalibrationError> {
         problem: format!("the folder cannot be read ({error})"),
     };
     let mut paths = Vec::new();
+    crate::files::input(folder).map_err(unreadable)?;
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
         let extension = path

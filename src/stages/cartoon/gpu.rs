@@ -4,41 +4,42 @@ use bytemuck::{Pod, Zeroable};
 
 use super::{CartoonSettings, CartoonStyle, FlowSettings};
 use crate::gpu::GpuError;
+use crate::shared::shared;
 use crate::stages::EncodedImage;
 use crate::stages::GpuStages;
 use crate::stages::cartoon::{Cartoon, EdgeResponses, flow_weights};
 
-/// Of the shaders.
-const MODULE: &str = "stages::cartoon::gpu";
+shared! {
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    struct CartoonParams {
+        width: u32,
+        height: u32,
+        small_width: u32,
+        small_height: u32,
+        /// -1 / (2 sigma_p^2).
+        factor: f32,
+        alpha: f32,
+        beta: f32,
+        s0: f32,
+        s1: f32,
+        a0: f32,
+        a1: f32,
+        /// 1: `lines` hold the silhouettes.
+        flow: u32,
+    }
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct CartoonParams {
-    width: u32,
-    height: u32,
-    small_width: u32,
-    small_height: u32,
-    factor: f32,
-    alpha: f32,
-    beta: f32,
-    s0: f32,
-    s1: f32,
-    a0: f32,
-    a1: f32,
-    flow: u32,
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct FlowParams {
-    tensor_count: u32,
-    inner_count: u32,
-    outer_count: u32,
-    line_count: u32,
-    tau: f32,
-    t0: f32,
-    t1: f32,
-    pad: u32,
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    struct FlowParams {
+        /// Weights of each half Gaussian stand in `weights`, one after the other: tensor, inner, outer, line.
+        tensor_count: u32,
+        inner_count: u32,
+        outer_count: u32,
+        line_count: u32,
+        tau: f32,
+        t0: f32,
+        t1: f32,
+        pad: u32,
+    }
 }
 
 impl GpuStages {
@@ -90,7 +91,7 @@ impl GpuStages {
                 ("simplified", &simplified),
                 ("next", &next),
             ];
-            self.dispatch(&mut encoder, (MODULE, pass), &buffers, small)?;
+            self.dispatch(&mut encoder, (SHARED.path(), pass), &buffers, small)?;
             std::mem::swap(&mut simplified, &mut next);
         }
         let lines = match settings.style {
@@ -106,7 +107,12 @@ impl GpuStages {
             ("lines", &lines),
             ("result", &result),
         ];
-        self.dispatch(&mut encoder, (MODULE, "stage_compose"), &buffers, size)?;
+        self.dispatch(
+            &mut encoder,
+            (SHARED.path(), "stage_compose"),
+            &buffers,
+            size,
+        )?;
         let words = if with_edges { 6 * count } else { 3 * count };
         let words = self.finish(encoder, &result, words)?;
         let (rgb, planes) = words.split_at(3 * count);
@@ -171,7 +177,7 @@ impl GpuStages {
                 ("lines_out", &lines),
                 ("luma", &luma),
             ];
-            self.dispatch(encoder, (MODULE, pass), &buffers, size)?;
+            self.dispatch(encoder, (SHARED.path(), pass), &buffers, size)?;
             std::mem::swap(&mut field, &mut next);
         }
         Ok(lines)

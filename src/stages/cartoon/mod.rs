@@ -25,19 +25,23 @@ use rayon::prelude::*;
 use super::finish::{Shot, Stage};
 use super::{EncodedImage, GpuStages};
 use crate::gpu::GpuError;
+use crate::shared::shared;
 use edges::{gradient_row, smoothstep_};
 pub use flow::flow_weights;
 use planes::{PAD, Planes, rgb_from_yuv};
 pub use settings::{CartoonSettings, CartoonStyle, FlowSettings};
 
-/// Red and blue weights of brightness (BT.601); green has the rest.
-const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
-/// Largest values of U and V.
-const U_MAX: f32 = 0.436;
-const V_MAX: f32 = 0.615;
+shared! {
+    /// Weights of red, green and blue in brightness (BT.601).
+    const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
+    /// Largest values of U and V.
+    const U_MAX: f32 = 0.436;
+    const V_MAX: f32 = 0.615;
+}
 
 pub(super) const STAGE: Stage = Stage {
     name: "cartoon",
+    declared: &[&SHARED, &gpu::SHARED, &planes::SHARED, &simplify::SHARED],
     wants: |shot| shot.scene.stages.cartoon.is_some(),
     run,
 };

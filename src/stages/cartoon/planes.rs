@@ -4,10 +4,13 @@
 use rayon::prelude::*;
 
 use super::{LUMA, U_MAX, V_MAX};
+use crate::shared::shared;
 use crate::stages::EncodedImage;
 
-/// Columns beyond each end of a row: half of the 5 x 5 window.
-pub(super) const PAD: usize = 2;
+shared! {
+    /// Columns beyond each end of a row: half of the 5 x 5 window.
+    pub(super) const PAD: usize = 2;
+}
 
 #[derive(Clone, Debug)]
 pub(super) struct Planes {

@@ -1,10 +1,15 @@
 //! The simplified colour picture: equations 1 to 3 on a shrunk picture. Twin of `shaders/stages/cartoon/simplify.wgsl`.
 
 use super::planes::{PAD, Planes, yuv_from_rgb};
+use crate::shared::shared;
 use crate::stages::EncodedImage;
 
-/// Exponents below this give weights that vanish beside the centre's 1.
-const LEAST_EXPONENT: f32 = -80.0;
+shared! {
+    /// Exponents below this give weights that vanish beside the centre's 1.
+    const LEAST_EXPONENT: f32 = -80.0;
+    const LOG2_E: f32 = std::f32::consts::LOG2_E;
+    const LN_2: f32 = std::f32::consts::LN_2;
+}
 
 /// One pixel of a shrunk row: where it begins and how much of each pixel of the large row lies in it; the weights add up to 1.
 struct Cover {
@@ -109,14 +114,14 @@ fn filter_row(image: &Planes, row: usize, factor: f32, [y, u, v]: [&mut [f32]; 3
 
 /// e^x for x <= 0, to 3e-7 relative; without calls, so that the loop over a row becomes vector code.
 pub(super) fn gaussian(x: f32) -> f32 {
-    let t = x.max(LEAST_EXPONENT) * std::f32::consts::LOG2_E;
+    let t = x.max(LEAST_EXPONENT) * LOG2_E;
     let whole = (t - 0.5) as i32;
     let r = t - whole as f32;
     // Taylor series of 2^r on [-1/2, 1/2]
     let p = (((((1.540_353e-4 * r + 1.333_355_8e-3) * r + 9.618_129e-3) * r + 0.055_504_11) * r
         + 0.240_226_5)
         * r
-        + std::f32::consts::LN_2)
+        + LN_2)
         * r
         + 1.0;
     p * f32::from_bits(((whole + 127) as u32) << 23)

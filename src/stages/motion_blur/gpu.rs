@@ -4,24 +4,23 @@ use bytemuck::{Pod, Zeroable};
 
 use super::Copies;
 use crate::gpu::GpuError;
+use crate::shared::shared;
 use crate::stages::GpuStages;
 
-/// Of the shaders.
-const MODULE: &str = "stages::motion_blur::gpu";
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct CopiesParams {
-    width: u32,
-    height: u32,
-    count: u32,
-    opacity: f32,
-    start: [f32; 2],
-    step: [f32; 2],
-    centre_opacity: f32,
-    pad_0: u32,
-    pad_1: u32,
-    pad_2: u32,
+shared! {
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    struct CopiesParams {
+        width: u32,
+        height: u32,
+        count: u32,
+        opacity: f32,
+        start: [f32; 2],
+        step: [f32; 2],
+        centre_opacity: f32,
+        pad_0: u32,
+        pad_1: u32,
+        pad_2: u32,
+    }
 }
 
 impl GpuStages {
@@ -53,7 +52,7 @@ impl GpuStages {
             let layer = self.array("layer", layer.as_flattened())?;
             self.dispatch(
                 &mut encoder,
-                (MODULE, "stage_copies"),
+                (SHARED.path(), "stage_copies"),
                 &[("params", &params), ("layer", &layer), ("canvas", &result)],
                 (width, height),
             )?;

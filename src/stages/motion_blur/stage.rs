@@ -28,6 +28,7 @@ pub struct PictureMotion {
 
 pub(in crate::stages) const STAGE: Stage = Stage {
     name: "motion_blur",
+    declared: &[&super::gpu::SHARED],
     wants: |shot| {
         let settings = shot.scene.stages.motion_blur;
         shot.motion.is_some() && settings.is_some_and(|s| s.method == MotionBlurMethod::Copies)

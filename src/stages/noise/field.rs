@@ -5,10 +5,13 @@ use std::ops::Range;
 
 use super::kernel::{KERNEL_SIDE, fit_kernel, overlap};
 use crate::math::{hash_combine, log_, sincos_2pi, uniform_from_bits};
+use crate::shared::shared;
 use crate::stages::settings::{LAGS, NoiseProfile};
 
-/// Coordinates are shifted by this before they are hashed: pixels beyond the left and top borders have numbers too.
-const MARGIN: u32 = 16;
+shared! {
+    /// Coordinates are shifted by this before they are hashed: pixels beyond the left and top borders have numbers too.
+    const MARGIN: u32 = 16;
+}
 
 /// Correlations below this are not worth a convolution.
 const WHITE_ENOUGH: f64 = 0.01;

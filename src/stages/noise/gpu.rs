@@ -4,32 +4,32 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::film::Picture;
 use crate::gpu::GpuError;
+use crate::shared::shared;
 use crate::stages::GpuStages;
 use crate::stages::noise::{NoiseInput, NoiseSource, NoiseStage, sigma_table};
 use crate::stages::settings::LAGS;
 
-/// Of the shaders.
-const MODULE: &str = "stages::noise::gpu";
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct NoiseParams {
-    width: u32,
-    height: u32,
-    bins: u32,
-    seed: u32,
-    frame: u32,
-    reach: u32,
-    has_photo: u32,
-    texture_size: u32,
-    scale: f32,
-    magnification: f32,
-    rotation_sin: f32,
-    rotation_cos: f32,
-    offset_x: f32,
-    offset_y: f32,
-    pad0: u32,
-    pad1: u32,
+shared! {
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    struct NoiseParams {
+        width: u32,
+        height: u32,
+        bins: u32,
+        seed: u32,
+        frame: u32,
+        /// Of the kernels, pixels; 0 where the noise is white.
+        reach: u32,
+        has_photo: u32,
+        texture_size: u32,
+        scale: f32,
+        magnification: f32,
+        rotation_sin: f32,
+        rotation_cos: f32,
+        offset_x: f32,
+        offset_y: f32,
+        pad0: u32,
+        pad1: u32,
+    }
 }
 
 impl GpuStages {
@@ -96,8 +96,13 @@ impl GpuStages {
                     ("weights", &weights),
                     ("white", &white),
                 ];
-                self.dispatch(&mut encoder, (MODULE, "stage_white"), &buffers, wide)?;
-                self.dispatch(&mut encoder, (MODULE, "stage_missing"), &buffers, size)?;
+                self.dispatch(&mut encoder, (SHARED.path(), "stage_white"), &buffers, wide)?;
+                self.dispatch(
+                    &mut encoder,
+                    (SHARED.path(), "stage_missing"),
+                    &buffers,
+                    size,
+                )?;
             }
             NoiseSource::Textures(textures) => {
                 let placement = textures.placement(frame);
@@ -114,7 +119,12 @@ impl GpuStages {
                     ("mask", &mask),
                     ("textures", &texels),
                 ];
-                self.dispatch(&mut encoder, (MODULE, "stage_textures"), &buffers, size)?;
+                self.dispatch(
+                    &mut encoder,
+                    (SHARED.path(), "stage_textures"),
+                    &buffers,
+                    size,
+                )?;
             }
         }
         let words = self.finish(encoder, &values, 3 * count)?;

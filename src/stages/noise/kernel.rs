@@ -1,9 +1,13 @@
 //! A filter that gives white noise a measured autocorrelation.
 
+use crate::shared::shared;
 use crate::stages::settings::{Autocorrelation, LAGS};
 
-/// 7 x 7 weights.
-pub const KERNEL_SIDE: usize = 2 * LAGS + 1;
+shared! {
+    /// 7 x 7 weights.
+    pub const KERNEL_SIDE: usize = 2 * LAGS + 1;
+}
+
 pub type Kernel = [[f64; KERNEL_SIDE]; KERNEL_SIDE];
 
 /// Free weights: the centre and one of each pair of opposite ones.

@@ -39,10 +39,13 @@ use rayon::prelude::*;
 
 use super::curve::{decode_, encode_rgb};
 use crate::film::Picture;
+use crate::shared::shared;
 
-/// Intensities are shifted by this much before they are sorted into bins, so that no whole code lies on the border of two, where
-/// rounding would decide. DN.
-pub const BIN_SHIFT: f32 = 0.01;
+shared! {
+    /// Intensities are shifted by this much before they are sorted into bins, so that no whole code lies on the border of two, where
+    /// rounding would decide. DN.
+    pub const BIN_SHIFT: f32 = 0.01;
+}
 
 /// Rows that one task works on.
 const BAND: usize = 32;

@@ -1,7 +1,7 @@
 //! The noise that a film's composite lacks.
 
 use super::own_variance::own_variance;
-use super::{NoiseInput, NoiseMethod, NoiseSettings, NoiseStage};
+use super::{NoiseInput, NoiseMethod, NoiseSettings, NoiseStage, field, gpu, kernel};
 use crate::film::{Film, Means};
 use crate::gpu::GpuError;
 use crate::scene::Composite;
@@ -10,6 +10,12 @@ use crate::stages::finish::{Shot, Stage};
 
 pub(in crate::stages) const STAGE: Stage = Stage {
     name: "noise",
+    declared: &[
+        &super::SHARED,
+        &field::SHARED,
+        &gpu::SHARED,
+        &kernel::SHARED,
+    ],
     wants: |shot| shot.scene.stages.noise.is_some(),
     run,
 };

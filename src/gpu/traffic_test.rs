@@ -1,0 +1,104 @@
+//! The table of docs/architecture.md: what a step reads and writes, by the sizes that the kernels declare.
+
+use std::collections::BTreeMap;
+
+use super::kernel::reflect_bindings;
+use super::lanes::PARTS_GROUP;
+use super::profile::KERNELS;
+use super::{Composer, Features};
+
+const DOC: &str = include_str!("../../docs/architecture.md");
+const LANE: u32 = 4;
+
+/// Bytes of an element of each array of the state that a kernel binds, in the largest variant of an estimator.
+fn parts(kernel: &str, paper: bool) -> BTreeMap<String, u32> {
+    let features = Features {
+        paper,
+        ..Features::all()
+    };
+    let wgsl = Composer::default()
+        .compose("gpu::kernels", kernel, &features)
+        .expect("composes");
+    reflect_bindings(&wgsl)
+        .expect("valid")
+        .into_iter()
+        .filter(|binding| binding.group == PARTS_GROUP)
+        .map(|binding| (binding.name, binding.stride))
+        .collect()
+}
+
+fn state_bytes(paper: bool) -> u32 {
+    let all: BTreeMap<_, _> = KERNELS
+        .iter()
+        .flat_map(|kernel| parts(kernel, paper))
+        .collect();
+    all.values().sum()
+}
+
+/// Rows of the table.
+fn rows(size: &BTreeMap<String, u32>) -> Vec<String> {
+    let [ray, hits, path, next, real, difference, result] = [
+        "path_rays",
+        "path_hits",
+        "paths",
+        "path_nexts",
+        "path_reals",
+        "path_differences",
+        "path_results",
+    ]
+    .map(|part| size[part]);
+    let advance = (LANE + ray + hits + path, ray + path + LANE);
+    let row = |what: &str, (read, written): (u32, u32)| format!("| {what} | {read} | {written} |");
+    let with = |read: u32, written: u32| (advance.0 + read, advance.1 + written);
+    vec![
+        row("sample that ends before its first ray", (0, result)),
+        row(
+            "sample that asks for its first ray",
+            (0, result + ray + hits + path + LANE),
+        ),
+        row("trace", (LANE + ray, hits)),
+        row("advance, at least", advance),
+        row(
+            "advance to a difference vertex, all techniques played",
+            with(0, next + difference),
+        ),
+        row(
+            "advance from its shadow ray, which adds light, to its cones",
+            with(result + next, result),
+        ),
+        row(
+            "advance from its cones, where virtual geometry is nearer",
+            with(0, real),
+        ),
+        row("advance to the real path behind", with(real, 0)),
+        row("advance to the recursion", with(difference, 0)),
+    ]
+}
+
+#[test]
+fn a_step_moves_as_many_bytes_as_the_documentation_says() {
+    let mut size = parts("kernel_advance", false);
+    for row in rows(&size) {
+        assert!(DOC.contains(&row), "docs/architecture.md lacks: {row}");
+    }
+    let state = [false, true].map(state_bytes);
+    let sentence = format!("{} bytes, with `paper` {}", state[0], state[1]);
+    assert!(
+        DOC.contains(&sentence),
+        "docs/architecture.md lacks: {sentence}"
+    );
+    *size.get_mut("path_rays").expect("is bound") += 4;
+    let wrong = rows(&size);
+    assert!(!DOC.contains(&wrong[2]), "control: {}", wrong[2]);
+}
+
+#[test]
+fn tracing_touches_the_hot_record_and_the_hits_alone() {
+    for paper in [false, true] {
+        let trace = parts("kernel_trace", paper);
+        assert_eq!(trace.keys().collect::<Vec<_>>(), ["path_hits", "path_rays"]);
+        assert!(trace["path_rays"] <= 64, "{trace:?}");
+        let advance = parts("kernel_advance", paper);
+        assert!(advance.len() > trace.len(), "control: {advance:?}");
+    }
+}

@@ -1,0 +1,224 @@
+//! Every reader of the program: what it reads, how that is damaged, and what must hold of what is read.
+
+use std::path::Path;
+
+use mixray::output::{ChannelFile, read_film};
+use mixray::scene::gltf::load_gltf;
+use mixray::scene::trajectory::{Trajectory, read_intrinsics};
+use mixray::scene::{NoiseProfile, Photo, load};
+use mixray::video::FrameSource;
+
+use super::mutate::Random;
+use super::mutate::{bytes, glb, png, text};
+use super::{Outcome, seeds};
+
+/// What reads files of a kind.
+pub struct Reader {
+    pub name: &'static str,
+    /// What the file is called.
+    pub file: &'static str,
+    pub valid: fn() -> Vec<Vec<u8>>,
+    pub damage: fn(&[u8], &mut Random) -> Vec<u8>,
+    /// Puts what was damaged into the file that holds it.
+    pub wrap: fn(Vec<u8>) -> Vec<u8>,
+    pub read: fn(&Path) -> Outcome,
+}
+
+pub fn all() -> Vec<Reader> {
+    let reader = |name, file, valid, damage, read| Reader {
+        name,
+        file,
+        valid,
+        damage,
+        wrap: |bytes| bytes,
+        read,
+    };
+    vec![
+        reader("scene", "scene.toml", seeds::scenes, text, scene),
+        reader("model", "model.glb", seeds::models, glb, model),
+        Reader {
+            wrap: |texture| seeds::model(&texture),
+            ..reader("texture", "model.glb", seeds::textures, bytes, model)
+        },
+        reader("png", "photo.png", seeds::pngs, png, photo),
+        reader("jpeg", "photo.jpg", seeds::jpegs, bytes, photo),
+        reader("hdr", "photo.hdr", seeds::hdrs, bytes, photo),
+        reader("exr", "photo.exr", seeds::exrs, bytes, photo),
+        reader("channels", "mask.exr", seeds::exrs, bytes, channels),
+        reader("film", "film.exr", seeds::films, bytes, film),
+        reader("y4m", "video.y4m", seeds::y4ms, bytes, video),
+        reader("mjpeg", "video.mjpeg", seeds::mjpegs, bytes, video),
+        reader("toml poses", "poses.toml", seeds::toml_poses, text, poses),
+        reader("json poses", "poses.json", seeds::json_poses, text, poses),
+        reader("tum poses", "poses.txt", seeds::tum_poses, text, poses),
+        reader(
+            "colmap images",
+            "images.txt",
+            seeds::colmap_images,
+            text,
+            colmap_images,
+        ),
+        reader(
+            "colmap cameras",
+            "cameras.txt",
+            seeds::colmap_cameras,
+            text,
+            colmap_cameras,
+        ),
+        reader(
+            "intrinsics",
+            "camera.yaml",
+            seeds::opencv_intrinsics,
+            text,
+            intrinsics,
+        ),
+        reader("profile", "noise.toml", seeds::profiles, text, profile),
+    ]
+}
+
+fn outcome<T, E: ToString>(
+    read: Result<T, E>,
+    check: impl FnOnce(T) -> Result<(), String>,
+) -> Outcome {
+    match read {
+        Err(error) => Outcome::Refused(error.to_string()),
+        Ok(value) => match check(value) {
+            Ok(()) => Outcome::Read,
+            Err(problem) => Outcome::Wrong(problem),
+        },
+    }
+}
+
+/// As [`outcome`]; a message names a file of the input's folder.
+fn named_outcome<T, E: ToString>(
+    path: &Path,
+    read: Result<T, E>,
+    check: impl FnOnce(T) -> Result<(), String>,
+) -> Outcome {
+    let folder = path.parent().unwrap_or(path).display().to_string();
+    match outcome(read, check) {
+        Outcome::Refused(message) if !message.contains(&folder) => {
+            Outcome::Wrong(format!("a message without its file: {message}"))
+        }
+        other => other,
+    }
+}
+
+fn finite(values: impl IntoIterator<Item = f64>, what: &str) -> Result<(), String> {
+    match values.into_iter().find(|x| !x.is_finite()) {
+        Some(x) => Err(format!("{what} holds {x}")),
+        None => Ok(()),
+    }
+}
+
+fn all_finite(photo: &Photo) -> Result<(), String> {
+    if photo.linear.len() != photo.width as usize * photo.height as usize {
+        return Err("a picture has more or fewer pixels than its size says".to_owned());
+    }
+    finite(
+        photo.linear.as_flattened().iter().map(|x| f64::from(*x)),
+        "a picture",
+    )
+}
+
+fn scene(path: &Path) -> Outcome {
+    named_outcome(path, load(path), |scene| {
+        let camera = &scene.camera;
+        finite([camera.fx, camera.fy, camera.cx, camera.cy], "the camera")?;
+        finite(
+            camera.world_from_camera.to_cols_array(),
+            "the camera's pose",
+        )
+    })
+}
+
+fn model(path: &Path) -> Outcome {
+    named_outcome(path, load_gltf(path), |model| {
+        for instance in &model.instances {
+            finite(instance.object_from_local.to_cols_array(), "a transform")?;
+            let positions = instance.primitive.positions.as_flattened();
+            finite(positions.iter().map(|x| f64::from(*x)), "a mesh")?;
+        }
+        Ok(())
+    })
+}
+
+fn photo(path: &Path) -> Outcome {
+    outcome(Photo::read(path), |(photo, _)| all_finite(&photo))
+}
+
+fn channels(path: &Path) -> Outcome {
+    named_outcome(path, ChannelFile::read(path), |file| {
+        let count = file.width as usize * file.height as usize;
+        match file.floats.values().all(|plane| plane.len() == count) {
+            true => Ok(()),
+            false => Err("a channel has more or fewer samples than the size says".to_owned()),
+        }
+    })
+}
+
+fn film(path: &Path) -> Outcome {
+    named_outcome(path, read_film(path), |(film, _)| {
+        let sums = film.pixels.iter().flat_map(|pixel| {
+            [pixel.m_im, pixel.diff, pixel.m_ir, pixel.r_ir, pixel.sq].map(|sum| sum.hi)
+        });
+        finite(sums.flatten().map(f64::from), "a film")
+    })
+}
+
+fn video(path: &Path) -> Outcome {
+    let read = || -> Result<(), String> {
+        let mut source = FrameSource::open(path).map_err(|error| error.to_string())?;
+        while let Some((_, frame)) = source.next(&|_| true).map_err(|error| error.to_string())? {
+            all_finite(&frame.ok_or("a frame was asked for and is not there")?.photo)?;
+        }
+        Ok(())
+    };
+    named_outcome(path, read(), Ok)
+}
+
+fn poses(path: &Path) -> Outcome {
+    named_outcome(path, Trajectory::read(path), |trajectory| {
+        let poses = trajectory
+            .entries
+            .iter()
+            .filter_map(|entry| entry.world_from_camera);
+        finite(poses.flat_map(|pose| pose.to_cols_array()), "a pose")
+    })
+}
+
+fn colmap_images(path: &Path) -> Outcome {
+    beside(path, "cameras.txt", &seeds::colmap_cameras()[0]);
+    poses(path)
+}
+
+fn colmap_cameras(path: &Path) -> Outcome {
+    beside(path, "images.txt", &seeds::colmap_images()[0]);
+    poses(&path.with_file_name("images.txt"))
+}
+
+fn beside(path: &Path, name: &str, bytes: &[u8]) {
+    let other = path.with_file_name(name);
+    if !other.exists() {
+        std::fs::write(other, bytes).expect("a writable folder");
+    }
+}
+
+fn intrinsics(path: &Path) -> Outcome {
+    named_outcome(path, read_intrinsics(path), |intrinsics| {
+        finite(
+            [intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy],
+            "a camera",
+        )?;
+        finite(intrinsics.distortion, "a distortion")
+    })
+}
+
+fn profile(path: &Path) -> Outcome {
+    outcome(NoiseProfile::read(path), |profile| {
+        finite(
+            profile.bins.iter().flat_map(|bin| bin.sigma),
+            "a noise profile",
+        )
+    })
+}
