@@ -37,6 +37,7 @@ pub mod output;
 pub mod packed;
 pub mod renderer;
 pub mod scene;
+pub mod sequence;
 pub mod shared;
 pub mod stages;
 

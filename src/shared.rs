@@ -37,13 +37,12 @@ pub trait SharedValue {
     fn value(self) -> Value;
 }
 
-/// The value of a constant as WGSL has it.
+/// The value of a constant as WGSL has it; several numbers are a vector if there are at most four, else an array.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     U32(u32),
     I32(i32),
     F32(f32),
-    Vec3([f32; 3]),
     U32s(Vec<u32>),
     F32s(Vec<f32>),
 }
@@ -51,28 +50,25 @@ pub enum Value {
 impl Value {
     /// Type and literal; the literal has the very bits.
     fn wgsl(&self) -> (String, String) {
-        let composed = |kind: String, parts: Vec<String>| {
-            let value = format!("{kind}({})", parts.join(", "));
-            (kind, value)
-        };
         match self {
             Self::U32(x) => ("u32".to_owned(), format!("{x}u")),
             Self::I32(x) => ("i32".to_owned(), format!("{x}i")),
             Self::F32(x) => ("f32".to_owned(), format!("{x:?}f")),
-            Self::Vec3(parts) => composed(
-                "vec3<f32>".to_owned(),
-                parts.iter().map(|x| format!("{x:?}f")).collect(),
-            ),
-            Self::U32s(parts) => composed(
-                format!("array<u32, {}>", parts.len()),
-                parts.iter().map(|x| format!("{x}u")).collect(),
-            ),
-            Self::F32s(parts) => composed(
-                format!("array<f32, {}>", parts.len()),
-                parts.iter().map(|x| format!("{x:?}f")).collect(),
-            ),
+            Self::U32s(parts) => several("u32", parts.iter().map(|x| format!("{x}u"))),
+            Self::F32s(parts) => several("f32", parts.iter().map(|x| format!("{x:?}f"))),
         }
     }
+}
+
+/// Type and value of a vector or array.
+fn several(kind: &str, parts: impl ExactSizeIterator<Item = String>) -> (String, String) {
+    let kind = match parts.len() {
+        count @ 2..=4 => format!("vec{count}<{kind}>"),
+        count => format!("array<{kind}, {count}>"),
+    };
+    let parts: Vec<String> = parts.collect();
+    let value = format!("{kind}({})", parts.join(", "));
+    (kind, value)
 }
 
 /// One constant.
@@ -202,12 +198,6 @@ impl SharedValue for f32 {
     fn value(self) -> Value {
         assert!(self.is_finite(), "WGSL has no literal for {self}");
         Value::F32(self)
-    }
-}
-
-impl SharedValue for glam::Vec3 {
-    fn value(self) -> Value {
-        Value::Vec3(self.to_array())
     }
 }
 

@@ -3,7 +3,6 @@
 import package::packed::records::{SAMPLER_CMJ, SAMPLER_JITTERED};
 import package::math::{hash_combine, hash_u32, uniform_from_bits};
 
-
 struct SampleKey {
     pixel: u32,
     index: u32,
@@ -80,8 +79,7 @@ fn grid_pair(set: SampleSet, pair: u32) -> vec2<u32> {
 }
 
 fn sobol(set: SampleSet, number: u32) -> u32 {
-    let seeds = vec4<u32>(SOBOL_SEEDS[0], SOBOL_SEEDS[1], SOBOL_SEEDS[2], SOBOL_SEEDS[3]);
-    let seed = hash_u32(set.stream ^ seeds[number]);
+    let seed = hash_u32(set.stream ^ SOBOL_SEEDS[number]);
     return reverseBits(owen_scramble(sobol_reversed(set.point, set.order[number]), seed));
 }
 

@@ -1,14 +1,14 @@
 // What estimator and vertex share: random numbers of a decision, weights, accumulation. Rust twin: src/cpu/contribution.rs.
 
 import package::gpu::buffers::{frame, pixels};
-import package::camera::sampler::{SampleKey, sample_4d};
+import package::camera::sampler::{SampleKey, SampleSet, sample_set};
 import package::cpu::state::{
     DELTA_DENSITY, MODE_REAL, MODE_SHARED, PathState, path_radiances_real, path_results,
 };
 
-fn draw(st: ptr<function, PathState>, purpose: u32) -> vec4<f32> {
-    let v = sample_4d(sample_key(st), FIRST_DEPTH_SET + (*st).ray.depth * SETS_PER_DEPTH + purpose);
-    return vec4<f32>(v.z, v.x, v.y, v.w);
+fn draw(st: ptr<function, PathState>, purpose: u32) -> SampleSet {
+    let set_id = FIRST_DEPTH_SET + (*st).ray.depth * SETS_PER_DEPTH + purpose;
+    return sample_set(sample_key(st), set_id);
 }
 
 fn sample_key(st: ptr<function, PathState>) -> SampleKey {

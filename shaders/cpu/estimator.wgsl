@@ -4,7 +4,7 @@ import package::gpu::buffers::{frame, pixels};
 import package::packed::records::{FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PIXEL_BEAM_MAY_MEET_VIRTUAL};
 import package::shared::NONE;
 import package::material::bsdf::bsdf_albedo;
-import package::light::cones::cone_pdf;
+import package::light::cones::{cone_pdf, cones_at};
 import package::cpu::contribution::{accumulate, density_weight, sample_key};
 import package::light::environment::env_radiance;
 import package::camera::lens::camera_ray_from;
@@ -327,7 +327,7 @@ fn difference_bsdf(st: ptr<function, PathState>) {
 fn vertex_cone_density(st: ptr<function, PathState>) -> f32 {
     let probability = path_differences[(*st).lane].cone_probability;
     if probability == 0.0 { return 0.0; }
-    return probability * cone_pdf((*st).ray.origin.position, path_differences[(*st).lane].normal, (*st).ray.direction);
+    return probability * cone_pdf(cones_at((*st).ray.origin.position, path_differences[(*st).lane].normal), (*st).ray.direction);
 }
 
 fn split_difference(st: ptr<function, PathState>) {

@@ -19,10 +19,12 @@ struct Query {
     t_max: f32,
     // The answer goes to the real world's hit rather than the virtual one's.
     to_real: bool,
+    // With it the request is answered.
+    is_last: bool,
 }
 
-fn query(world: u32, any_hit: bool, t_max: f32) -> Query {
-    return Query(world, any_hit, t_max, world == WORLD_REAL);
+fn query(world: u32, any_hit: bool, t_max: f32, is_last: bool) -> Query {
+    return Query(world, any_hit, t_max, world == WORLD_REAL, is_last);
 }
 
 // The request as a sequence of at most three queries, so that a kernel has one trace call site; `hits`: what the earlier ones met.
@@ -31,46 +33,47 @@ fn next_query(request: u32, step: u32, t_max: f32, hits: Hits) -> Query {
     let met_virtual = hits.in_virtual.triangle != NONE;
     switch request {
         case REQUEST_CLOSEST_VIRTUAL: {
-            if step == 0u { return query(WORLD_VIRTUAL, false, t_max); }
+            if step == 0u { return query(WORLD_VIRTUAL, false, t_max, true); }
         }
         case REQUEST_CLOSEST_REAL: {
-            if step == 0u { return query(WORLD_REAL, false, t_max); }
+            if step == 0u { return query(WORLD_REAL, false, t_max, true); }
         }
         case REQUEST_CLOSEST_MIXED: {
-            if step == 0u { return query(WORLD_VIRTUAL, false, t_max); }
-            if step == 1u { return query(WORLD_REAL, false, hits.in_virtual.t); }
+            if step == 0u { return query(WORLD_VIRTUAL, false, t_max, false); }
+            if step == 1u { return query(WORLD_REAL, false, hits.in_virtual.t, true); }
         }
         case REQUEST_CLOSEST_EACH: {
-            if step == 0u { return query(WORLD_VIRTUAL, false, t_max); }
-            if step == 1u { return query(WORLD_REAL, false, t_max); }
+            if step == 0u { return query(WORLD_VIRTUAL, false, t_max, false); }
+            if step == 1u { return query(WORLD_REAL, false, t_max, true); }
         }
         case REQUEST_VIRTUAL_THEN_REAL: {
-            if step == 0u { return query(WORLD_VIRTUAL, false, t_max); }
-            if step == 1u && met_virtual { return query(WORLD_REAL, false, t_max); }
+            if step == 0u { return query(WORLD_VIRTUAL, false, t_max, false); }
+            if step == 1u && met_virtual { return query(WORLD_REAL, false, t_max, true); }
         }
         case REQUEST_REAL_UNLESS_COVERED: {
-            if step == 0u { return query(WORLD_REAL, false, t_max); }
-            if step == 1u && met_real { return query(WORLD_VIRTUAL, true, hits.in_real.t * (1.0 + COINCIDENCE)); }
+            if step == 0u { return query(WORLD_REAL, false, t_max, false); }
+            let covering = hits.in_real.t * (1.0 + COINCIDENCE);
+            if step == 1u && met_real { return query(WORLD_VIRTUAL, true, covering, true); }
         }
         case REQUEST_SHADOW_MIXED: {
-            if step == 0u { return query(WORLD_VIRTUAL, true, t_max); }
-            if step == 1u && !met_virtual { return query(WORLD_REAL, true, t_max); }
+            if step == 0u { return query(WORLD_VIRTUAL, true, t_max, false); }
+            if step == 1u && !met_virtual { return query(WORLD_REAL, true, t_max, true); }
         }
         case REQUEST_SHADOW_REAL: {
-            if step == 0u { return query(WORLD_REAL, true, t_max); }
+            if step == 0u { return query(WORLD_REAL, true, t_max, true); }
         }
         case REQUEST_SHADOW_DIFFERENCE: {
-            if step == 0u { return query(WORLD_VIRTUAL, true, t_max); }
-            if step == 1u && (met_virtual || asks_both()) { return query(WORLD_REAL, true, t_max); }
+            if step == 0u { return query(WORLD_VIRTUAL, true, t_max, false); }
+            if step == 1u && (met_virtual || asks_both()) { return query(WORLD_REAL, true, t_max, true); }
         }
         case REQUEST_SHADOW_PAIR: {
-            if step == 0u { return query(WORLD_REAL, true, t_max); }
-            if step == 1u { return query(WORLD_VIRTUAL, true, t_max); }
-            if step == 2u && !met_virtual { return Query(WORLD_REAL, true, t_max, false); }
+            if step == 0u { return query(WORLD_REAL, true, t_max, false); }
+            if step == 1u { return query(WORLD_VIRTUAL, true, t_max, false); }
+            if step == 2u && !met_virtual { return Query(WORLD_REAL, true, t_max, false, true); }
         }
         default: {}
     }
-    return query(QUERY_NONE, false, 0.0);
+    return query(QUERY_NONE, false, 0.0, true);
 }
 
 fn asks_both() -> bool {
@@ -141,6 +144,7 @@ fn answer(st: ptr<function, PathState>, thread: u32) {
             hit.t = 0.0;
         }
         if q.to_real { hits.in_real = hit; } else { hits.in_virtual = hit; }
+        if q.is_last { break; }
         step += 1u;
     }
     if request == REQUEST_CLOSEST_REAL {

@@ -7,7 +7,8 @@ import package::packed::records::{
 };
 import package::shared::NONE;
 import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample};
-import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
+import package::camera::sampler::{SampleSet, fourth, pair, second_pair, third};
+import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres};
 import package::cpu::contribution::{accumulate, density_weight, draw};
 import package::cpu::contribution::{
     SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
@@ -99,7 +100,7 @@ fn left_to_cones(s: Surface) -> bool {
 fn techniques_at(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>) -> Techniques {
     if (frame.flags & FRAME_NO_CONES) != 0u { return Techniques(0.0, 1.0); }
     let strength = max_element(abs((*st).path.throughput * bsdf_albedo(s, wo)));
-    let reach = cone_solid_angle_fraction(s.position, s.ns);
+    let reach = cone_solid_angle_fraction(cones_at(s.position, s.ns));
     let cone_probability = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
     var bsdf_probability = 1.0;
     if bsdf_is_lambertian(s) {
@@ -135,7 +136,12 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, technique
     let difference = is_difference(st);
     let set_id = select(SET_PATH_LIGHT, SET_DIFFERENCE_LIGHT, difference);
     let u = draw(st, set_id);
-    let l = light_sample(light_select(u.x, u.w), s.position, u.yz);
+    var index = 0u;
+    if frame.light_count > 1u {
+        let choice_coin = second_pair(u);
+        index = light_select(choice_coin.x, choice_coin.y);
+    }
+    let l = light_sample(index, s.position, pair(u));
     let contribution = light_contribution(st, s, wo, techniques, l);
     if any(contribution != vec3<f32>(0.0)) {
         plan_shadow(st, s, l, contribution);
@@ -160,7 +166,7 @@ fn light_contribution(
         @if(!paper) {
             if difference {
                 other = 0.0;
-                if techniques.cone_probability > 0.0 { other = techniques.cone_probability * cone_pdf(s.position, s.ns, l.direction); }
+                if techniques.cone_probability > 0.0 { other = techniques.cone_probability * cone_pdf(cones_at(s.position, s.ns), l.direction); }
                 if !left_to_cones(s) { other += f.pdf; }
             }
         }
@@ -188,14 +194,14 @@ fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample, contrib
     (*st).path.pending |= PENDING_SHADOW;
 }
 
-fn plays(u: vec4<f32>, probability: f32) -> bool {
-    return probability >= 1.0 || u.w < probability;
+fn plays(u: SampleSet, probability: f32) -> bool {
+    return probability >= 1.0 || fourth(u) < probability;
 }
 
 fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques) {
     let u = draw(st, SET_DIFFERENCE_CONE);
     if frame.sphere_count == 0u || !plays(u, techniques.cone_probability) { return; }
-    let c = cone_sample(s.position, s.ns, u.x, u.yz);
+    let c = cone_sample(cones_at(s.position, s.ns), third(u), pair(u));
     if c.pdf <= 0.0 { return; }
     let f = bsdf_eval(s, wo, c.direction);
     if max_element(f.f_cos) <= 0.0 { return; }
@@ -225,7 +231,9 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
     if difference && leaves_to_cones && (*st).ray.depth >= frame.max_bounces { return; }
     let u = draw(st, select(SET_PATH_BSDF, SET_DIFFERENCE_BSDF, difference));
     if !plays(u, techniques.bsdf_probability) { return; }
-    let b = bsdf_sample(s, wo, u.xyz);
+    var lobe = 0.0;
+    if !bsdf_is_lambertian(s) { lobe = third(u); }
+    let b = bsdf_sample(s, wo, vec3<f32>(lobe, pair(u)));
     if !b.valid { return; }
     var segment = Segment(
         b.wi,

@@ -27,26 +27,17 @@ fn sum_add(hi: f32, lo: f32, x: f32, zero: u32) -> vec2<f32> {
     return vec2<f32>(h, e - h_part);
 }
 
-fn sum3_add(sum: Sum3, x: vec3<f32>, zero: u32) -> Sum3 {
-    let r = sum_add(sum.hi[0], sum.lo[0], x.x, zero);
-    let g = sum_add(sum.hi[1], sum.lo[1], x.y, zero);
-    let b = sum_add(sum.hi[2], sum.lo[2], x.z, zero);
-    return Sum3(array<f32, 3>(r.x, g.x, b.x), array<f32, 3>(r.y, g.y, b.y));
-}
-
 // NaN, infinite or so large that its square would overflow the sums.
 fn is_unusable(x: vec3<f32>) -> bool {
     let bits = bitcast<vec3<u32>>(x) & vec3<u32>(0x7fffffffu);
     return bits.x > LARGEST_SAMPLE_BITS || bits.y > LARGEST_SAMPLE_BITS || bits.z > LARGEST_SAMPLE_BITS;
 }
 
-fn count_unusable(sums: PixelSums, index: u32) -> PixelSums {
-    var out = sums;
-    if out.non_finite == 0u {
-        out.first_non_finite = index;
-    }
-    out.non_finite = out.non_finite + 1u;
-    return out;
+fn sum3_add(sum: Sum3, x: vec3<f32>, zero: u32) -> Sum3 {
+    let r = sum_add(sum.hi[0], sum.lo[0], x.x, zero);
+    let g = sum_add(sum.hi[1], sum.lo[1], x.y, zero);
+    let b = sum_add(sum.hi[2], sum.lo[2], x.z, zero);
+    return Sum3(array<f32, 3>(r.x, g.x, b.x), array<f32, 3>(r.y, g.y, b.y));
 }
 
 // One sample of the main pass: `contribution` is im where the primary ray met virtual geometry, else im - ir.
@@ -80,6 +71,15 @@ fn pixel_add_real(sums: PixelSums, index: u32, is_virtual: bool, real: vec3<f32>
     } else {
         out.r_ir = sum3_add(out.r_ir, real, zero);
     }
+    return out;
+}
+
+fn count_unusable(sums: PixelSums, index: u32) -> PixelSums {
+    var out = sums;
+    if out.non_finite == 0u {
+        out.first_non_finite = index;
+    }
+    out.non_finite = out.non_finite + 1u;
     return out;
 }
 

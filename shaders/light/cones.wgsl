@@ -3,7 +3,6 @@
 import package::gpu::buffers::frame;
 import package::math::{PI, cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
 
-
 struct Cone {
     axis: vec3<f32>,
     sin2: f32,
@@ -32,21 +31,32 @@ fn cone_of(i: u32, position: vec3<f32>, ns: vec3<f32>) -> Cone {
     return Cone(axis, sin2, one_minus_cos, false, max(2.0 * one_minus_cos * (largest + COSINE_PADDING), 0.0));
 }
 
+// All spheres seen from a point; each is seen anew for each question.
+struct Cones {
+    position: vec3<f32>,
+    ns: vec3<f32>,
+    total: f32,
+}
+
+fn cones_at(position: vec3<f32>, ns: vec3<f32>) -> Cones {
+    var seen = Cones(position, ns, 0.0);
+    for (var i = 0u; i < frame.sphere_count; i++) {
+        seen.total += cone_of(i, position, ns).weight;
+    }
+    return seen;
+}
+
 struct ConeSample {
     direction: vec3<f32>,
     pdf: f32,
 }
 
-fn cone_sample(position: vec3<f32>, ns: vec3<f32>, choice: f32, u: vec2<f32>) -> ConeSample {
-    var total = 0.0;
+fn cone_sample(cones: Cones, choice: f32, u: vec2<f32>) -> ConeSample {
+    if cones.total <= 0.0 { return ConeSample(cones.ns, 0.0); }
+    var left = choice * cones.total;
+    var chosen = cone_of(0u, cones.position, cones.ns);
     for (var i = 0u; i < frame.sphere_count; i++) {
-        total += cone_of(i, position, ns).weight;
-    }
-    if total <= 0.0 { return ConeSample(ns, 0.0); }
-    var left = choice * total;
-    var chosen = cone_of(0u, position, ns);
-    for (var i = 0u; i < frame.sphere_count; i++) {
-        let cone = cone_of(i, position, ns);
+        let cone = cone_of(i, cones.position, cones.ns);
         if cone.weight <= 0.0 { continue; }
         left -= cone.weight;
         chosen = cone;
@@ -62,22 +72,20 @@ fn cone_sample(position: vec3<f32>, ns: vec3<f32>, choice: f32, u: vec2<f32>) ->
     let phi = sincos_2pi(u.y);
     let basis = orthonormal_basis(chosen.axis);
     let direction = basis.t * (sin * phi.cos) + basis.b * (sin * phi.sin) + chosen.axis * cos;
-    return ConeSample(direction, cone_pdf(position, ns, direction));
+    return ConeSample(direction, cone_pdf(cones, direction));
 }
 
-fn cone_pdf(position: vec3<f32>, ns: vec3<f32>, direction: vec3<f32>) -> f32 {
-    var total = 0.0;
+fn cone_pdf(cones: Cones, direction: vec3<f32>) -> f32 {
     var sum = 0.0;
     for (var i = 0u; i < frame.sphere_count; i++) {
-        let cone = cone_of(i, position, ns);
-        total += cone.weight;
+        let cone = cone_of(i, cones.position, cones.ns);
         if cone.wide {
-            sum += cone.weight * max(dot3(direction, ns), 0.0) * (1.0 / PI);
+            sum += cone.weight * max(dot3(direction, cones.ns), 0.0) * (1.0 / PI);
         } else if inside(cone, direction) {
             sum += cone.weight / (2.0 * PI * cone.one_minus_cos);
         }
     }
-    if total > 0.0 { return sum / total; }
+    if cones.total > 0.0 { return sum / cones.total; }
     return 0.0;
 }
 
@@ -86,12 +94,12 @@ fn inside(cone: Cone, direction: vec3<f32>) -> bool {
     return dot3(direction, cone.axis) > 0.0 && dot3(across, across) <= cone.sin2 * (1.0 + CONE_PADDING) + CONE_PADDING_SIN2;
 }
 
-fn cone_solid_angle_fraction(position: vec3<f32>, ns: vec3<f32>) -> f32 {
-    var total = 0.0;
-    for (var i = 0u; i < frame.sphere_count; i++) {
-        total += cone_of(i, position, ns).weight;
-    }
-    return min(total, 1.0);
+fn cone_solid_angle_fraction(cones: Cones) -> f32 {
+    return min(cones.total, 1.0);
+}
+
+fn padded_radius_squared(radius: f32, distance_squared: f32) -> f32 {
+    return radius * radius * (1.0 + SPHERE_PADDING) + distance_squared * SPHERE_PADDING_DISTANCE2;
 }
 
 fn direction_meets_spheres(position: vec3<f32>, direction: vec3<f32>) -> bool {
@@ -99,8 +107,7 @@ fn direction_meets_spheres(position: vec3<f32>, direction: vec3<f32>) -> bool {
         let sphere = frame.spheres[i];
         let to_centre = sphere.xyz - position;
         let distance_squared = dot3(to_centre, to_centre);
-        let radius_squared = sphere.w * sphere.w * (1.0 + SPHERE_PADDING)
-            + distance_squared * SPHERE_PADDING_DISTANCE2;
+        let radius_squared = padded_radius_squared(sphere.w, distance_squared);
         if distance_squared <= radius_squared { return true; }
         let across = cross3(direction, to_centre);
         if dot3(direction, to_centre) > 0.0 && dot3(across, across) <= radius_squared { return true; }

@@ -99,11 +99,15 @@ fn env_evaluate(direction: vec3<f32>) -> EnvEvaluation {
             let interpolated = max(luminance(env_interpolate(n, above)), 0.0);
             return EnvEvaluation(
                 interpolated * frame.env_radiance.w,
-                env_interpolate(n, n.fy) * frame.env_radiance.xyz,
+                env_interpolate(n, n.fy) * env_scale(),
             );
         }
     }
-    return EnvEvaluation(0.25 / PI, frame.env_radiance.xyz);
+    return EnvEvaluation(0.25 / PI, env_scale());
+}
+
+fn env_scale() -> vec3<f32> {
+    return frame.env_radiance.xyz;
 }
 
 fn env_radiance(direction: vec3<f32>) -> vec3<f32> {
@@ -111,10 +115,10 @@ fn env_radiance(direction: vec3<f32>) -> vec3<f32> {
         if frame.env_width != 0u {
             let c = env_coordinates(direction);
             let n = env_neighbours(c.x, c.y);
-            return env_interpolate(n, n.fy) * frame.env_radiance.xyz;
+            return env_interpolate(n, n.fy) * env_scale();
         }
     }
-    return frame.env_radiance.xyz;
+    return env_scale();
 }
 
 @if(environment_map)
@@ -157,7 +161,7 @@ fn env_sample(u0: f32, u1: f32) -> EnvSample {
     let y = 1.0 - 2.0 * u0;
     let r = safe_sqrt(1.0 - y * y);
     let phi = sincos_2pi(u1);
-    return EnvSample(vec3<f32>(r * phi.cos, y, r * phi.sin), frame.env_radiance.xyz, 0.25 / PI);
+    return EnvSample(vec3<f32>(r * phi.cos, y, r * phi.sin), env_scale(), 0.25 / PI);
 }
 
 @if(environment_map)

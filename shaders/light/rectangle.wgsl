@@ -17,6 +17,10 @@ struct Rectangle {
     start: f32,
 }
 
+fn is_right_angle(ex: vec3<f32>, ey: vec3<f32>) -> bool {
+    return abs(dot3(ex, ey)) <= RIGHT_ANGLE;
+}
+
 fn rectangle_from(light: Light, position: vec3<f32>) -> Rectangle {
     let width = length3(light.axis_u.xyz);
     let depth = length3(light.axis_v.xyz);
@@ -27,7 +31,7 @@ fn rectangle_from(light: Light, position: vec3<f32>) -> Rectangle {
     let x0 = dot3(offset, ex);
     let y0 = dot3(offset, ey);
     var r = Rectangle(ex, ey, ez, x0, x0 + width, y0, y0 + depth, -dot3(offset, ez), 0.0, 0.0);
-    if light.kind != LIGHT_QUAD || abs(dot3(ex, ey)) > RIGHT_ANGLE || r.height <= 0.0 { return r; }
+    if light.kind != LIGHT_QUAD || !is_right_angle(ex, ey) || r.height <= 0.0 { return r; }
     let inv_height = 1.0 / r.height;
     let nx0 = in_heights(r.x0, inv_height);
     let nx1 = in_heights(r.x1, inv_height);

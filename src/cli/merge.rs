@@ -6,12 +6,13 @@ use clap::Args;
 
 use super::progress::Bar;
 use super::render::write;
+use super::scene_flags::SceneFlags;
 use super::values::png_bits;
 use super::{Failure, Outcome, print, say};
 use crate::film::Film;
 use crate::output::{FilmNote, PngBits, Target, read_film};
 use crate::renderer::{Progress, Renderer, Watcher};
-use crate::scene::{self, BackendChoice, Scene};
+use crate::scene::{BackendChoice, Scene};
 
 /// Puts films of sample ranges together
 ///
@@ -28,6 +29,8 @@ pub(super) struct Arguments {
     /// Scene file [default: where it was when the first part was rendered]
     #[arg(long)]
     scene: Option<PathBuf>,
+    #[command(flatten)]
+    flags: SceneFlags,
     /// Bits a channel of PNG pictures [default: 16 for a 16-bit photograph, else 8]
     #[arg(long, value_parser = png_bits())]
     png_bits: Option<PngBits>,
@@ -59,7 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let Some(first) = parts.next() else {
         return Err(Failure("there is nothing to merge".to_owned()));
     };
-    let scene = load(&first, arguments.scene.as_deref())?;
+    let scene = load(&first, arguments.scene.as_deref(), arguments.flags)?;
     let (mut film, mut range) = (first.film, first.note.range);
     for part in parts {
         film.merge(&part.film)
@@ -129,7 +132,7 @@ fn check(parts: &[Part]) -> Result<(), Failure> {
 }
 
 /// The scene as it was rendered.
-fn load(part: &Part, given: Option<&Path>) -> Result<Scene, Failure> {
+fn load(part: &Part, given: Option<&Path>, flags: SceneFlags) -> Result<Scene, Failure> {
     let path = given.unwrap_or(Path::new(&part.note.scene));
     if given.is_none() && !path.exists() {
         return Err(Failure(format!(
@@ -137,7 +140,7 @@ fn load(part: &Part, given: Option<&Path>) -> Result<Scene, Failure> {
             path.display()
         )));
     }
-    let mut scene = scene::load(path)?;
+    let mut scene = flags.load(path)?;
     scene.settings.apply(&part.note.overrides());
     scene.settings.backend = BackendChoice::Cpu;
     for warning in &scene.warnings {

@@ -17,6 +17,7 @@ mod picture_flags;
 mod pool;
 mod progress;
 mod render;
+mod scene_flags;
 mod sequence;
 mod stage_device;
 mod summary;

@@ -97,6 +97,21 @@ impl Steps {
         Self(Some(bar))
     }
 
+    /// How many steps there are.
+    pub(super) fn expect(&self, count: u64) {
+        if let Some(bar) = &self.0 {
+            bar.set_length(count);
+        }
+    }
+
+    /// Says something while the bar steps aside.
+    pub(super) fn aside(&self, speak: impl FnOnce()) {
+        match &self.0 {
+            Some(bar) => bar.suspend(speak),
+            None => speak(),
+        }
+    }
+
     /// Something within a step.
     pub(super) fn say(&self, message: &str) {
         if let Some(bar) = &self.0 {

@@ -16,7 +16,7 @@ use crate::output::{
 use crate::renderer::{
     Budget, CameraNoise, ErrorGoal, Progress, Renderer, RendererOptions, SCRAMBLES, Stats, Watcher,
 };
-use crate::scene::{self, MotionBlurMethod, Overrides};
+use crate::scene::{MotionBlurMethod, Overrides};
 use crate::stages::{GpuStages, finish};
 
 /// Renders a scene's virtual objects into its photograph
@@ -132,7 +132,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         None => "rays per pixel",
     };
     let bar = Bar::new("reading the scene", unit);
-    let mut scene = scene::load(&job.scene)?;
+    let mut scene = job.flags.scene.load(&job.scene)?;
     scene.settings.apply(&job.overrides);
     let mut goal = job.goal;
     if let Some(goal) = goal.as_mut().filter(|_| job.noise_of_scene) {
@@ -170,7 +170,11 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let watcher = Watcher::none().heard_by(&hear);
     let mut renderer = Renderer::new(scene, options, &watcher)?;
     let without = renderer.without();
-    bar.aside(|| say_idle(&renderer, goal.as_ref()));
+    let estimator = renderer.scene().settings.estimator;
+    let on_gpu = renderer.gpu_device().is_some();
+    for (saving, reason) in without.idle(estimator, on_gpu, goal.as_ref()) {
+        bar.aside(|| say_idle(saving, reason));
+    }
     let goal = goal.map(|goal| goal.without(without));
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
@@ -267,16 +271,12 @@ pub(super) fn write(
     Ok(())
 }
 
-/// Says which savings were switched off in vain.
-pub(super) fn say_idle(renderer: &Renderer, goal: Option<&ErrorGoal>) {
-    let estimator = renderer.scene().settings.estimator;
-    let on_gpu = renderer.gpu_device().is_some();
-    for (name, reason) in renderer.without().idle(estimator, on_gpu, goal) {
-        say(
-            "note",
-            &format!("--no-skip {name} changes nothing here: {reason}"),
-        );
-    }
+/// Says that a saving was switched off in vain.
+pub(super) fn say_idle(saving: &str, reason: &str) {
+    say(
+        "note",
+        &format!("--no-skip {saving} changes nothing here: {reason}"),
+    );
 }
 
 /// Says which sample to render again to see the first of them.

@@ -19,11 +19,11 @@ shared! {
 }
 
 /// Random numbers of one decision at the present vertex, computed when asked for. The samplers spread the first pair of a set best: it is what
-/// directions and points on lights are found by. (The shader computes all four at once, as a vector.)
+/// directions and points on lights are found by.
 #[inline]
 pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> SampleSet {
-    let set = FIRST_DEPTH_SET + st.ray.depth * SETS_PER_DEPTH + purpose;
-    sample_set(sample_key(scene, st), set)
+    let set_id = FIRST_DEPTH_SET + st.ray.depth * SETS_PER_DEPTH + purpose;
+    sample_set(sample_key(scene, st), set_id)
 }
 
 pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {

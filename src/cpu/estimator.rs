@@ -13,7 +13,7 @@ use crate::accel::Hit;
 use crate::camera::lens::camera_ray_from;
 use crate::camera::sampler::sample_4d;
 use crate::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
-use crate::light::cones::{Cones, cone_pdf};
+use crate::light::cones::{cone_pdf, cones_at};
 use crate::light::environment::env_radiance;
 use crate::light::lights::env_arriving;
 use crate::material::{Surface, bsdf_albedo, surface_at};
@@ -411,7 +411,7 @@ fn vertex_cone_density(scene: &PackedScene, st: &PathState) -> f32 {
     }
     probability
         * cone_pdf(
-            &Cones::at(&scene.frame, st.ray.origin.position, st.difference.normal),
+            &cones_at(&scene.frame, st.ray.origin.position, st.difference.normal),
             st.ray.direction,
         )
 }

@@ -28,14 +28,18 @@ struct Query {
     t_max: f32,
     /// The answer goes to the real world's hit rather than the virtual one's.
     to_real: bool,
+    /// With it the request is answered.
+    is_last: bool,
 }
 
-fn query(world: u32, any_hit: bool, t_max: f32) -> Query {
+#[inline]
+fn query(world: u32, any_hit: bool, t_max: f32, is_last: bool) -> Query {
     Query {
         world,
         any_hit,
         t_max,
         to_real: world == WORLD_REAL,
+        is_last,
     }
 }
 
@@ -45,32 +49,33 @@ fn next_query(scene: &PackedScene, request: u32, step: u32, t_max: f32, hits: &H
     let met_real = hits.in_real.triangle != NONE;
     let met_virtual = hits.in_virtual.triangle != NONE;
     match (request, step) {
-        (REQUEST_CLOSEST_VIRTUAL, 0) => query(WORLD_VIRTUAL, false, t_max),
-        (REQUEST_CLOSEST_REAL, 0) => query(WORLD_REAL, false, t_max),
-        (REQUEST_CLOSEST_MIXED, 0) => query(WORLD_VIRTUAL, false, t_max),
-        (REQUEST_CLOSEST_MIXED, 1) => query(WORLD_REAL, false, hits.in_virtual.t),
-        (REQUEST_CLOSEST_EACH, 0) => query(WORLD_VIRTUAL, false, t_max),
-        (REQUEST_CLOSEST_EACH, 1) => query(WORLD_REAL, false, t_max),
-        (REQUEST_VIRTUAL_THEN_REAL, 0) => query(WORLD_VIRTUAL, false, t_max),
-        (REQUEST_VIRTUAL_THEN_REAL, 1) if met_virtual => query(WORLD_REAL, false, t_max),
-        (REQUEST_REAL_UNLESS_COVERED, 0) => query(WORLD_REAL, false, t_max),
+        (REQUEST_CLOSEST_VIRTUAL, 0) => query(WORLD_VIRTUAL, false, t_max, true),
+        (REQUEST_CLOSEST_REAL, 0) => query(WORLD_REAL, false, t_max, true),
+        (REQUEST_CLOSEST_MIXED, 0) => query(WORLD_VIRTUAL, false, t_max, false),
+        (REQUEST_CLOSEST_MIXED, 1) => query(WORLD_REAL, false, hits.in_virtual.t, true),
+        (REQUEST_CLOSEST_EACH, 0) => query(WORLD_VIRTUAL, false, t_max, false),
+        (REQUEST_CLOSEST_EACH, 1) => query(WORLD_REAL, false, t_max, true),
+        (REQUEST_VIRTUAL_THEN_REAL, 0) => query(WORLD_VIRTUAL, false, t_max, false),
+        (REQUEST_VIRTUAL_THEN_REAL, 1) if met_virtual => query(WORLD_REAL, false, t_max, true),
+        (REQUEST_REAL_UNLESS_COVERED, 0) => query(WORLD_REAL, false, t_max, false),
         (REQUEST_REAL_UNLESS_COVERED, 1) if met_real => {
-            query(WORLD_VIRTUAL, true, hits.in_real.t * (1.0 + COINCIDENCE))
+            let covering = hits.in_real.t * (1.0 + COINCIDENCE);
+            query(WORLD_VIRTUAL, true, covering, true)
         }
-        (REQUEST_SHADOW_MIXED, 0) => query(WORLD_VIRTUAL, true, t_max),
-        (REQUEST_SHADOW_MIXED, 1) if !met_virtual => query(WORLD_REAL, true, t_max),
-        (REQUEST_SHADOW_REAL, 0) => query(WORLD_REAL, true, t_max),
-        (REQUEST_SHADOW_DIFFERENCE, 0) => query(WORLD_VIRTUAL, true, t_max),
+        (REQUEST_SHADOW_MIXED, 0) => query(WORLD_VIRTUAL, true, t_max, false),
+        (REQUEST_SHADOW_MIXED, 1) if !met_virtual => query(WORLD_REAL, true, t_max, true),
+        (REQUEST_SHADOW_REAL, 0) => query(WORLD_REAL, true, t_max, true),
+        (REQUEST_SHADOW_DIFFERENCE, 0) => query(WORLD_VIRTUAL, true, t_max, false),
         (REQUEST_SHADOW_DIFFERENCE, 1) if met_virtual || asks_both(scene) => {
-            query(WORLD_REAL, true, t_max)
+            query(WORLD_REAL, true, t_max, true)
         }
-        (REQUEST_SHADOW_PAIR, 0) => query(WORLD_REAL, true, t_max),
-        (REQUEST_SHADOW_PAIR, 1) => query(WORLD_VIRTUAL, true, t_max),
+        (REQUEST_SHADOW_PAIR, 0) => query(WORLD_REAL, true, t_max, false),
+        (REQUEST_SHADOW_PAIR, 1) => query(WORLD_VIRTUAL, true, t_max, false),
         (REQUEST_SHADOW_PAIR, 2) if !met_virtual => Query {
             to_real: false,
-            ..query(WORLD_REAL, true, t_max)
+            ..query(WORLD_REAL, true, t_max, true)
         },
-        _ => query(QUERY_NONE, false, 0.0),
+        _ => query(QUERY_NONE, false, 0.0, true),
     }
 }
 
@@ -150,6 +155,9 @@ pub fn answer(scene: &PackedScene, st: &mut PathState) {
         } else {
             hits.in_virtual = hit;
         }
+        if q.is_last {
+            break;
+        }
         step += 1;
     }
     if request == REQUEST_CLOSEST_REAL {
@@ -181,6 +189,7 @@ fn trace(scene: &PackedScene, ray: &Ray, world: u32, any_hit: bool) -> Hit {
 /// world it starts as if virtual geometry lay in front of real geometry that coincides with it, as seen from where the path came: a ray
 /// that goes on through a virtual surface then meets the real one, and one that goes back meets it not. A shadow ray ends at the same point
 /// wherever it starts, short of its light: the light must not hide itself.
+#[inline]
 fn ray_into(ray: &PathRay, world: u32, t_max: f32) -> Ray {
     let offset = ray.origin.offset;
     let shift = if world == ray.side {

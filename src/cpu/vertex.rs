@@ -5,9 +5,9 @@ use glam::Vec3;
 use super::contribution::*;
 use super::state::*;
 use crate::camera::sampler::SampleSet;
+use crate::light::blocking::light_may_be_blocked;
 use crate::light::cones::{
-    Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
-    light_may_be_blocked,
+    Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres,
 };
 use crate::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 use crate::material::{
@@ -118,12 +118,12 @@ fn left_to_cones(scene: &PackedScene, s: &Surface) -> bool {
 fn techniques_at(scene: &PackedScene, st: &PathState, s: &Surface, wo: Vec3) -> Techniques {
     if scene.frame.flags & FRAME_NO_CONES != 0 {
         return Techniques {
-            cones: Cones::none(s.ns),
+            cones: Cones::default(),
             cone_probability: 0.0,
             bsdf_probability: 1.0,
         };
     }
-    let cones = Cones::at(&scene.frame, s.position, s.ns);
+    let cones = cones_at(&scene.frame, s.position, s.ns);
     let strength = (st.path.throughput * bsdf_albedo(s, wo))
         .abs()
         .max_element();

@@ -6,14 +6,14 @@
 mod paths;
 mod registry;
 
-pub(crate) use paths::final_target;
+pub(crate) use paths::{final_target, resolved};
 
 use std::fs::File;
 use std::io;
 use std::path::Path;
 use std::sync::Mutex;
 
-use paths::{Identity, resolved};
+use paths::Identity;
 use registry::Registry;
 
 pub use registry::Conflict;

@@ -74,7 +74,7 @@ impl Identity {
 }
 
 /// One path for each file however it is named, for files that do not exist yet too.
-pub(super) fn resolved(path: &Path) -> PathBuf {
+pub(crate) fn resolved(path: &Path) -> PathBuf {
     if let Ok(there) = path.canonicalize() {
         return there;
     }

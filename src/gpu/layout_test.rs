@@ -47,7 +47,7 @@ impl Reflected {
         };
         let expressions = &self.module.global_expressions;
         let value = |expression: &naga::Expression| match expression {
-            naga::Expression::Compose { ty, components } => {
+            naga::Expression::Compose { components, .. } => {
                 let (mut words, mut numbers) = (Vec::new(), Vec::new());
                 for part in components {
                     match literal(&expressions[*part])? {
@@ -56,11 +56,11 @@ impl Reflected {
                         _ => return None,
                     }
                 }
-                match self.module.types[*ty].inner {
-                    naga::TypeInner::Vector { .. } => numbers.try_into().ok().map(Value::Vec3),
-                    _ if numbers.is_empty() => Some(Value::U32s(words)),
-                    _ => Some(Value::F32s(numbers)),
-                }
+                Some(if numbers.is_empty() {
+                    Value::U32s(words)
+                } else {
+                    Value::F32s(numbers)
+                })
             }
             other => literal(other),
         };

@@ -3,10 +3,10 @@
 //! A direction that meets virtual geometry lies in at least one cone, so a mixture of uniform distributions over the cones covers all of (b) in
 //! docs/estimator.md. A sphere that subtends a wide cone, or contains the point, is replaced by the cosine-weighted hemisphere.
 
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 
 use crate::math::{PI, cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
-use crate::packed::{Frame, LIGHT_QUAD, Light, MAX_SPHERES};
+use crate::packed::{Frame, MAX_SPHERES};
 use crate::shared::shared;
 
 shared! {
@@ -24,7 +24,7 @@ shared! {
 }
 
 /// One sphere seen from a point.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Cone {
     /// Unit, to the centre.
     axis: Vec3,
@@ -36,14 +36,6 @@ struct Cone {
     /// Upper estimate of the cosine-weighted share of the hemisphere that it covers; 0 if it is wholly below the horizon.
     weight: f32,
 }
-
-const UNSEEN: Cone = Cone {
-    axis: Vec3::Z,
-    sin2: 0.0,
-    one_minus_cos: 0.0,
-    wide: false,
-    weight: 0.0,
-};
 
 fn cone_of(frame: &Frame, i: u32, position: Vec3, ns: Vec3) -> Cone {
     let sphere = frame.spheres[i as usize];
@@ -78,41 +70,29 @@ fn cone_of(frame: &Frame, i: u32, position: Vec3, ns: Vec3) -> Cone {
     }
 }
 
-/// All spheres seen from a point, computed once for all that is asked there. (The shader computes them anew for each question: it has
-/// arithmetic to spare, but no memory.)
+/// All spheres seen from a point, computed once for all that is asked there; by default, none. (The shader sees each anew for each question:
+/// it has arithmetic to spare, but no memory.)
+#[derive(Default)]
 pub struct Cones {
     cones: [Cone; MAX_SPHERES],
     count: usize,
+    ns: Vec3,
     /// Of the weights.
     total: f32,
-    ns: Vec3,
 }
 
-impl Cones {
-    /// Seen from `position` on a surface with the unit shading normal `ns`.
-    pub fn at(frame: &Frame, position: Vec3, ns: Vec3) -> Self {
-        let mut seen = Self::none(ns);
-        seen.count = frame.sphere_count as usize;
-        for i in 0..seen.count {
-            seen.cones[i] = cone_of(frame, i as u32, position, ns);
-            seen.total += seen.cones[i].weight;
-        }
-        seen
+/// Seen from `position` on a surface with the unit shading normal `ns`.
+pub fn cones_at(frame: &Frame, position: Vec3, ns: Vec3) -> Cones {
+    let mut seen = Cones {
+        count: frame.sphere_count as usize,
+        ns,
+        ..Cones::default()
+    };
+    for i in 0..seen.count {
+        seen.cones[i] = cone_of(frame, i as u32, position, ns);
+        seen.total += seen.cones[i].weight;
     }
-
-    /// Without anything virtual in sight.
-    pub fn none(ns: Vec3) -> Self {
-        Self {
-            cones: [UNSEEN; MAX_SPHERES],
-            count: 0,
-            total: 0.0,
-            ns,
-        }
-    }
-
-    fn seen(&self) -> &[Cone] {
-        &self.cones[..self.count]
-    }
+    seen
 }
 
 /// A direction inside the cones.
@@ -133,7 +113,7 @@ pub fn cone_sample(cones: &Cones, choice: f32, u: [f32; 2]) -> ConeSample {
     }
     let mut left = choice * cones.total;
     let mut chosen = cones.cones[0];
-    for cone in cones.seen() {
+    for cone in &cones.cones[..cones.count] {
         if cone.weight <= 0.0 {
             continue;
         }
@@ -162,7 +142,7 @@ pub fn cone_sample(cones: &Cones, choice: f32, u: [f32; 2]) -> ConeSample {
 /// Density of [`cone_sample`] in `direction` (unit).
 pub fn cone_pdf(cones: &Cones, direction: Vec3) -> f32 {
     let mut sum = 0.0;
-    for cone in cones.seen() {
+    for cone in &cones.cones[..cones.count] {
         if cone.wide {
             sum += cone.weight * dot3(direction, cones.ns).max(0.0) * (1.0 / PI);
         } else if inside(cone, direction) {
@@ -189,37 +169,8 @@ pub fn cone_solid_angle_fraction(cones: &Cones) -> f32 {
 }
 
 /// Squared radius of a sphere about which a direction's rounding can say nothing certain.
-fn padded_radius_squared(radius: f32, distance_squared: f32) -> f32 {
+pub(super) fn padded_radius_squared(radius: f32, distance_squared: f32) -> f32 {
     radius * radius * (1.0 + SPHERE_PADDING) + distance_squared * SPHERE_PADDING_DISTANCE2
-}
-
-/// False only if no direction from `position` to a quad light meets a sphere (each lies outside one of the four planes through the point and
-/// an edge of the quad) or the quad shines to the other side. True for other lights. Costs a fraction of drawing a point on the light, which must then be turned down. (No twin:
-/// the shader's threads wait for one another.)
-pub fn light_may_be_blocked(frame: &Frame, light: &Light, position: Vec3) -> bool {
-    if light.kind != LIGHT_QUAD {
-        return true;
-    }
-    let [u, v] = [light.axis_u, light.axis_v].map(|[x, y, z, _]| Vec3::new(x, y, z));
-    let [x, y, z, _] = light.position;
-    let a = Vec3::new(x, y, z) - position;
-    // Outward normals, one plane a lane.
-    let (from, to) = ([a, a + u, a + u + v, a + v], [u, v, -u, -v]);
-    let lanes = |corners: [Vec3; 4], axis: usize| Vec4::from(corners.map(|c| c[axis]));
-    let [ax, ay, az] = [0, 1, 2].map(|axis| lanes(from, axis));
-    let [bx, by, bz] = [0, 1, 2].map(|axis| lanes(to, axis));
-    let (nx, ny, nz) = (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);
-    let normals_squared = nx * nx + ny * ny + nz * nz;
-    frame.spheres[..frame.sphere_count as usize]
-        .iter()
-        .any(|&[x, y, z, radius]| {
-            let to_centre = Vec3::new(x, y, z) - position;
-            let radius_squared = padded_radius_squared(radius, dot3(to_centre, to_centre));
-            let height = nx * to_centre.x + ny * to_centre.y + nz * to_centre.z;
-            let outside = height.cmpgt(Vec4::ZERO)
-                & (height * height).cmpgt(normals_squared * radius_squared);
-            !outside.any()
-        })
 }
 
 /// False only if a ray from `position` cannot meet virtual geometry.

@@ -11,76 +11,6 @@ use glam::Vec3;
 use crate::math::{PI, atan2_, luminance, safe_sqrt, sincos_2pi};
 use crate::packed::{Frame, PackedScene};
 
-/// Cumulative distributions for sampling a map by brightness.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct EnvironmentTable {
-    /// Marginal over the height + 1 rows (height + 2 entries from 0 to 1), then for each row the conditional over its width columns
-    /// (width + 1 entries).
-    pub cdf: Vec<f32>,
-    /// 1 / integral of the cells' mean luminance over the sphere; 0 for a black map.
-    pub normaliser: f32,
-    /// Mean luminance over the sphere.
-    pub mean_luminance: f64,
-}
-
-/// Builds the table of a map of `width` x `height` texels, three floats each.
-pub fn environment_table(width: u32, height: u32, texels: &[f32]) -> EnvironmentTable {
-    let (w, h) = (width as usize, height as usize);
-    let lum = |i: usize, j: usize| {
-        let t = &texels[3 * (j * w + i)..][..3];
-        f64::from(luminance(Vec3::new(t[0], t[1], t[2])))
-    };
-    let rows = h + 1;
-    let mut row_sums = vec![0.0_f64; rows];
-    let mut conditionals = vec![0.0_f32; rows * (w + 1)];
-    for r in 0..rows {
-        let (top, bottom) = (r.max(1) - 1, r.min(h - 1));
-        let means: Vec<f64> = (0..w)
-            .map(|i| {
-                0.25 * (lum(i, top)
-                    + lum((i + 1) % w, top)
-                    + lum(i, bottom)
-                    + lum((i + 1) % w, bottom))
-            })
-            .collect();
-        let cos_at =
-            |row_edge: f64| (std::f64::consts::PI * (row_edge / h as f64).clamp(0.0, 1.0)).cos();
-        let solid_angle =
-            (cos_at(r as f64 - 0.5) - cos_at(r as f64 + 0.5)) * std::f64::consts::TAU / w as f64;
-        let total: f64 = means.iter().sum();
-        row_sums[r] = total * solid_angle;
-        fill_cdf(&mut conditionals[r * (w + 1)..][..w + 1], &means);
-    }
-    let integral: f64 = row_sums.iter().sum();
-    let mut cdf = vec![0.0_f32; rows + 1];
-    fill_cdf(&mut cdf, &row_sums);
-    cdf.extend_from_slice(&conditionals);
-    EnvironmentTable {
-        cdf,
-        normaliser: if integral > 0.0 {
-            (1.0 / integral) as f32
-        } else {
-            0.0
-        },
-        mean_luminance: integral / (4.0 * std::f64::consts::PI),
-    }
-}
-
-/// Running sums scaled to end at exactly 1; uniform where all weights are zero.
-fn fill_cdf(cdf: &mut [f32], weights: &[f64]) {
-    let total: f64 = weights.iter().sum();
-    let mut sum = 0.0;
-    for (i, weight) in weights.iter().enumerate() {
-        sum += weight;
-        cdf[i + 1] = if total > 0.0 {
-            (sum / total) as f32
-        } else {
-            (i + 1) as f32 / weights.len() as f32
-        };
-    }
-    cdf[weights.len()] = 1.0;
-}
-
 /// A direction drawn from the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvSample {
@@ -151,10 +81,14 @@ fn env_neighbours(scene: &PackedScene, u: f32, v: f32) -> Neighbours {
     }
 }
 
+/// Sine of half the angle from the zenith to a row's v.
+fn half_sin(v: f32) -> f32 {
+    sincos_2pi(0.25 * v).0
+}
+
 /// (cos a - cos x) / (cos a - cos b) for the row's edges a and b, as products of sines: differences of cosines cancel near the poles.
 fn row_solid_angle_above(row: f32, v: f32, height: f32) -> f32 {
     let (upper, lower) = row_edges(row, height);
-    let half_sin = |x: f32| sincos_2pi(0.25 * x).0;
     let above = half_sin(upper + v) * half_sin(v - upper);
     let whole = half_sin(upper + lower) * half_sin(lower - upper);
     (above / whole.max(1e-30)).clamp(0.0, 1.0)
@@ -210,12 +144,17 @@ fn sample_linear(u: f32, a: f32, b: f32) -> f32 {
     (u / (first + root).max(1e-20)).min(1.0)
 }
 
-/// Last index i with cdf[base + i] <= u among `count` intervals.
-fn find_interval(cdf: &[f32], base: u32, count: u32, u: f32) -> u32 {
+/// Luminance of a texel.
+fn env_corner(scene: &PackedScene, i: u32, j: u32) -> f32 {
+    luminance(env_texel(scene, i, j))
+}
+
+/// Last index i with cdf[base + i] <= u among `count` intervals of the environment's.
+fn find_interval(scene: &PackedScene, base: u32, count: u32, u: f32) -> u32 {
     let (mut low, mut high) = (0, count);
     while high - low > 1 {
         let middle = (low + high) / 2;
-        if cdf[(base + middle) as usize] <= u {
+        if scene.env_cdf[(base + middle) as usize] <= u {
             low = middle;
         } else {
             high = middle;
@@ -224,33 +163,44 @@ fn find_interval(cdf: &[f32], base: u32, count: u32, u: f32) -> u32 {
     low
 }
 
+/// Where u lies in the interval from entry `at` of the distributions to the next.
+fn env_within(scene: &PackedScene, at: u32, u: f32) -> f32 {
+    let (low, high) = (scene.env_cdf[at as usize], scene.env_cdf[at as usize + 1]);
+    ((u - low) / (high - low).max(1e-20)).clamp(0.0, 1.0)
+}
+
 /// Draws a direction by brightness; uniformly over the sphere if the environment is constant.
 pub fn env_sample(scene: &PackedScene, u0: f32, u1: f32) -> EnvSample {
-    let frame = &scene.frame;
-    if frame.env_width == 0 {
-        let y = 1.0 - 2.0 * u0;
-        let r = safe_sqrt(1.0 - y * y);
-        let (sin, cos) = sincos_2pi(u1);
-        return EnvSample {
-            direction: Vec3::new(r * cos, y, r * sin),
-            radiance: env_scale(frame),
-            pdf: 0.25 / PI,
-        };
+    if scene.frame.env_width != 0 {
+        return env_sample_map(scene, u0, u1);
     }
+    let y = 1.0 - 2.0 * u0;
+    let r = safe_sqrt(1.0 - y * y);
+    let (sin, cos) = sincos_2pi(u1);
+    EnvSample {
+        direction: Vec3::new(r * cos, y, r * sin),
+        radiance: env_scale(&scene.frame),
+        pdf: 0.25 / PI,
+    }
+}
+
+fn env_sample_map(scene: &PackedScene, u0: f32, u1: f32) -> EnvSample {
+    let frame = &scene.frame;
     let rows = frame.env_height + 1;
-    let row = find_interval(&scene.env_cdf, 0, rows, u0);
+    let row = find_interval(scene, 0, rows, u0);
     let base = rows + 1 + row * (frame.env_width + 1);
-    let column = find_interval(&scene.env_cdf, base, frame.env_width, u1);
-    let within = |at: u32, u: f32| {
-        let (low, high) = (scene.env_cdf[at as usize], scene.env_cdf[at as usize + 1]);
-        ((u - low) / (high - low).max(1e-20)).clamp(0.0, 1.0)
-    };
-    let (upper_u, left_u) = (within(row, u0), within(base + column, u1));
-    let corner = |i: u32, j: u32| luminance(env_texel(scene, i, j));
+    let column = find_interval(scene, base, frame.env_width, u1);
+    let (upper_u, left_u) = (
+        env_within(scene, row, u0),
+        env_within(scene, base + column, u1),
+    );
     let next = (column + 1) % frame.env_width;
     let (top, bottom) = (row.max(1) - 1, row.min(frame.env_height - 1));
-    let (l00, l10) = (corner(column, top), corner(next, top));
-    let (l01, l11) = (corner(column, bottom), corner(next, bottom));
+    let (l00, l10) = (env_corner(scene, column, top), env_corner(scene, next, top));
+    let (l01, l11) = (
+        env_corner(scene, column, bottom),
+        env_corner(scene, next, bottom),
+    );
     let fy = sample_linear(upper_u, l00 + l10, l01 + l11);
     let fx = sample_linear(left_u, l00 + (l01 - l00) * fy, l10 + (l11 - l10) * fy);
     // Squared sine and cosine of half the angle from the zenith: each is precise at its own pole.

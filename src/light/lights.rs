@@ -8,7 +8,7 @@ use crate::material::triangle_emission;
 use crate::math::{cross3, dot3, length3, safe_sqrt};
 use crate::packed::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE,
-    PackedScene, SIDE_REAL,
+    PackedScene, SIDE_REAL, xyz,
 };
 
 /// Light from one direction.
@@ -36,10 +36,6 @@ fn no_light() -> LightSample {
         delta: false,
         side: SIDE_REAL,
     }
-}
-
-fn xyz(v: [f32; 4]) -> Vec3 {
-    Vec3::new(v[0], v[1], v[2])
 }
 
 /// Alias method over all lights; the coin has a number of its own because `u` has too few bits left once a light of many is chosen.

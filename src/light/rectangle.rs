@@ -4,7 +4,7 @@
 use glam::{Vec2, Vec3};
 
 use crate::math::{INV_TAU, TAU, atan2_, cross3, dot3, length3, safe_sqrt, sincos_2pi};
-use crate::packed::{LIGHT_QUAD, Light};
+use crate::packed::{LIGHT_QUAD, Light, xyz};
 use crate::shared::shared;
 
 shared! {
@@ -34,31 +34,20 @@ pub struct Rectangle {
     start: f32,
 }
 
-fn is_right_angle(ex: Vec3, ey: Vec3) -> bool {
+/// Whether the unit edges of a quad make a right angle.
+pub fn is_right_angle(ex: Vec3, ey: Vec3) -> bool {
     dot3(ex, ey).abs() <= RIGHT_ANGLE
-}
-
-/// Whether the edges of a quad light make a right angle.
-pub fn is_rectangle(light: &Light) -> bool {
-    let [ux, uy, uz, _] = light.axis_u;
-    let [vx, vy, vz, _] = light.axis_v;
-    is_right_angle(
-        Vec3::new(ux, uy, uz).normalize_or_zero(),
-        Vec3::new(vx, vy, vz).normalize_or_zero(),
-    )
 }
 
 /// The quad `light` from `position`; `solid_angle` 0 for other lights, oblique quads, the dark side and small solid angles.
 pub fn rectangle_from(light: &Light, position: Vec3) -> Rectangle {
-    let [ux, uy, uz, _] = light.axis_u;
-    let [vx, vy, vz, _] = light.axis_v;
-    let (axis_u, axis_v) = (Vec3::new(ux, uy, uz), Vec3::new(vx, vy, vz));
+    let (axis_u, axis_v) = (xyz(light.axis_u), xyz(light.axis_v));
     let width = length3(axis_u);
     let depth = length3(axis_v);
     let ex = axis_u / width;
     let ey = axis_v / depth;
     let ez = cross3(ex, ey);
-    let offset = Vec3::new(light.position[0], light.position[1], light.position[2]) - position;
+    let offset = xyz(light.position) - position;
     let x0 = dot3(offset, ex);
     let y0 = dot3(offset, ey);
     let mut r = Rectangle {

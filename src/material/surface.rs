@@ -8,7 +8,7 @@ use crate::math::{cross3, dot3, safe_sqrt};
 use crate::packed::{
     MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
     MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, Material, NONE,
-    PackedScene, TEXTURE_UV1, Triangle, Vertex,
+    PackedScene, TEXTURE_UV1, Vertex, xyz,
 };
 use crate::shared::shared;
 
@@ -71,24 +71,16 @@ pub struct Surface {
 }
 
 /// Barycentric interpolation in the order that both backends use.
-fn blend3(b: Vec3, v0: Vec3, v1: Vec3, v2: Vec3) -> Vec3 {
+fn blend2(b: Vec3, v0: Vec2, v1: Vec2, v2: Vec2) -> Vec2 {
     v0 * b.x + v1 * b.y + v2 * b.z
 }
 
-fn blend2(b: Vec3, v0: Vec2, v1: Vec2, v2: Vec2) -> Vec2 {
+fn blend3(b: Vec3, v0: Vec3, v1: Vec3, v2: Vec3) -> Vec3 {
     v0 * b.x + v1 * b.y + v2 * b.z
 }
 
 fn blend4(b: Vec3, v0: Vec4, v1: Vec4, v2: Vec4) -> Vec4 {
     v0 * b.x + v1 * b.y + v2 * b.z
-}
-
-fn vertex_position(vertex: &Vertex) -> Vec3 {
-    Vec4::from(vertex.position_u0).truncate()
-}
-
-fn vertex_normal(vertex: &Vertex) -> Vec3 {
-    Vec4::from(vertex.normal_v0).truncate()
 }
 
 fn vertex_uv0(vertex: &Vertex) -> Vec2 {
@@ -97,10 +89,6 @@ fn vertex_uv0(vertex: &Vertex) -> Vec2 {
 
 fn vertex_uv1(vertex: &Vertex) -> Vec2 {
     Vec2::new(vertex.uv1[0], vertex.uv1[1])
-}
-
-fn corners<'a>(scene: &'a PackedScene, triangle: &Triangle) -> [&'a Vertex; 3] {
-    triangle.vertices.map(|v| &scene.vertices[v as usize])
 }
 
 /// Opacity of a base colour alpha under the material's alpha mode.
@@ -125,7 +113,7 @@ pub fn surface_alpha(scene: &PackedScene, hit: Hit) -> f32 {
     if material.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) == 0 {
         return 1.0;
     }
-    let [v0, v1, v2] = corners(scene, triangle);
+    let [v0, v1, v2] = triangle.vertices.map(|v| &scene.vertices[v as usize]);
     let b = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
     let mut alpha =
         material.base_color[3] * (v0.color[3] * b.x + v1.color[3] * b.y + v2.color[3] * b.z);
@@ -143,7 +131,7 @@ pub fn triangle_emission(scene: &PackedScene, triangle: u32, u: f32, v: f32) -> 
     let material = &scene.materials[record.material as usize];
     let mut emission = Vec3::from(material.emissive);
     if material.emissive_texture != NONE {
-        let [v0, v1, v2] = corners(scene, record);
+        let [v0, v1, v2] = record.vertices.map(|v| &scene.vertices[v as usize]);
         let b = Vec3::new(1.0 - u - v, u, v);
         let uv0 = blend2(b, vertex_uv0(v0), vertex_uv0(v1), vertex_uv0(v2));
         let uv1 = blend2(b, vertex_uv1(v0), vertex_uv1(v1), vertex_uv1(v2));
@@ -199,9 +187,9 @@ fn perturbed(
         );
         blended.truncate().extend(v0.tangent[3])
     } else {
-        let p0 = vertex_position(v0);
-        let e1 = vertex_position(v1) - p0;
-        let e2 = vertex_position(v2) - p0;
+        let p0 = xyz(v0.position_u0);
+        let e1 = xyz(v1.position_u0) - p0;
+        let e2 = xyz(v2.position_u0) - p0;
         tangent_from_uv(e1, e2, c1 - c0, c2 - c0, normal)
     };
     let sample = texture_sample(&scene.texels, texture, blend2(b, c0, c1, c2));
@@ -227,12 +215,12 @@ fn plane_error(e1: Vec3, e2: Vec3) -> f32 {
 pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface {
     let triangle = &scene.triangles[hit.triangle as usize];
     let material = &scene.materials[triangle.material as usize];
-    let [v0, v1, v2] = corners(scene, triangle);
+    let [v0, v1, v2] = triangle.vertices.map(|v| &scene.vertices[v as usize]);
     let b = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
     let (p0, p1, p2) = (
-        vertex_position(v0),
-        vertex_position(v1),
-        vertex_position(v2),
+        xyz(v0.position_u0),
+        xyz(v1.position_u0),
+        xyz(v2.position_u0),
     );
     let position = blend3(b, p0, p1, p2);
     let a0 = p0.abs();
@@ -245,9 +233,9 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
     let error = position_error.max(plane_error(e1, e2));
     let blended = unit(blend3(
         b,
-        vertex_normal(v0),
-        vertex_normal(v1),
-        vertex_normal(v2),
+        xyz(v0.normal_v0),
+        xyz(v1.normal_v0),
+        xyz(v2.normal_v0),
     ));
     let outward = triangle_normal(e1, e2, blended);
     let wo = -ray_direction;

@@ -188,6 +188,12 @@ pub fn write_film(
 /// In one line: the file cannot be read, or holds no film.
 pub fn read_film(path: &Path) -> Result<(Film, FilmNote), String> {
     let file = ChannelFile::read(path)?;
+    if let Some((channel, x, y)) = first_not_finite(&file) {
+        return Err(format!(
+            "{}: {channel} is NaN or infinite at pixel ({x}, {y}); expected the finite sums of `mixray render --range`; render the part again",
+            path.display()
+        ));
+    }
     let text = |i: usize| file.texts.get(NOTE_NAMES[i]).cloned();
     // Films had no such attribute before savings could be left out.
     let names = text(WITHOUT).unwrap_or_default();
@@ -205,6 +211,19 @@ pub fn read_film(path: &Path) -> Result<(Film, FilmNote), String> {
                 path.display()
             )
         })
+}
+
+/// A channel of sums and a pixel where it is not finite. No render writes such: a sample that is not finite is counted and left out.
+fn first_not_finite(file: &ChannelFile) -> Option<(&str, usize, usize)> {
+    let sums = file
+        .floats
+        .iter()
+        .filter(|(name, _)| name.starts_with("sums."));
+    sums.into_iter().find_map(|(name, samples)| {
+        let index = samples.iter().position(|sample| !sample.is_finite())?;
+        let width = file.width as usize;
+        Some((name.as_str(), index % width, index / width))
+    })
 }
 
 fn film_of(file: &ChannelFile, note: &FilmNote) -> Option<Film> {

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::accel::{AccelError, WorldBvh};
 use crate::camera::lens::frame_camera;
-use crate::light::environment::environment_table;
+use crate::light::environment_table::environment_table;
 use crate::scene::{
     Aperture, EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind,
     Scene, Side,

@@ -5,9 +5,9 @@ use glam::{DVec3, Vec2, Vec3};
 use super::{
     FRAME_LIGHTS_SUFFICE, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD,
     LIGHT_SPOT, LIGHT_TRIANGLE, Light, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT, Material, NONE,
-    PackedScene, SIDE_REAL, SIDE_VIRTUAL, TEXTURE_UV1,
+    PackedScene, SIDE_REAL, SIDE_VIRTUAL, TEXTURE_UV1, xyz,
 };
-use crate::light::rectangle::is_rectangle;
+use crate::light::rectangle::is_right_angle;
 use crate::material::texture_sample;
 use crate::math::luminance;
 use crate::scene::{LightKind, Scene, Side};
@@ -69,7 +69,10 @@ pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
 fn lights_suffice(lights: &[Light], materials: &[Material]) -> bool {
     lights.len() <= FEW_LIGHTS
         && lights.iter().all(|l| match l.kind {
-            LIGHT_QUAD => is_rectangle(l),
+            LIGHT_QUAD => is_right_angle(
+                xyz(l.axis_u).normalize_or_zero(),
+                xyz(l.axis_v).normalize_or_zero(),
+            ),
             LIGHT_DIRECTIONAL | LIGHT_POINT | LIGHT_SPOT => true,
             _ => false,
         })

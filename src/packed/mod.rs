@@ -42,7 +42,7 @@ pub struct PackedScene {
     pub lights: Vec<Light>,
     /// Environment texels, three floats each, row-major; empty for a constant environment or none.
     pub env_texels: Vec<f32>,
-    /// Cumulative distributions of the environment's cells (see `light::environment::EnvironmentTable`).
+    /// Cumulative distributions of the environment's cells (see `light::environment_table::EnvironmentTable`).
     pub env_cdf: Vec<f32>,
     /// For `albedo = "from-photo"`, empty where unused: albedo of the photograph's pixels and the depth (metres along the axis) it was seen
     /// at, then for each scene object the median that its points take which the camera does not see.

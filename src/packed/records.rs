@@ -2,6 +2,7 @@
 //! them is bound.
 
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 
 use crate::shared::shared;
 
@@ -256,6 +257,11 @@ shared! {
         pub sample_factor: u32,
         pub flags: u32,
     }
+}
+
+/// The vector in a field that WGSL pads to four numbers.
+pub fn xyz([x, y, z, _]: [f32; 4]) -> Vec3 {
+    Vec3::new(x, y, z)
 }
 
 impl PixelInfo {

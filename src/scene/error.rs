@@ -3,6 +3,8 @@
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
+use super::sandbox::Sandbox;
+
 /// Why a scene was refused. Displays as one line.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
@@ -32,6 +34,8 @@ pub(crate) struct Source {
     pub text: String,
     /// Files that were named and found.
     pub files: RefCell<Vec<PathBuf>>,
+    /// Where they have to lie, if anywhere.
+    pub sandbox: Option<Sandbox>,
 }
 
 impl Source {
@@ -58,7 +62,12 @@ impl Source {
 
     fn of(path: PathBuf, text: String) -> Self {
         let files = RefCell::new(vec![path.clone()]);
-        Self { path, text, files }
+        Self {
+            path,
+            text,
+            files,
+            sandbox: None,
+        }
     }
 
     /// An error at a byte offset.

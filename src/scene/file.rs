@@ -11,6 +11,7 @@ use super::light::read_lights;
 use super::object::ObjectReader;
 use super::photo::read_photo;
 use super::reader::Table;
+use super::sandbox::Sandbox;
 use super::settings::read_settings;
 use super::shutter::{read_camera_motion, read_shutter};
 use super::trajectory::Intrinsics;
@@ -37,6 +38,8 @@ pub struct Given {
     pub photo: Option<Photo>,
     /// Replaces the intrinsics in `[camera]`, which may then be absent.
     pub intrinsics: Option<Intrinsics>,
+    /// Refuses files outside the scene's folder, links followed: for scenes of others.
+    pub sandbox: bool,
 }
 
 /// Reads a scene file (TOML) and everything it names.
@@ -54,13 +57,15 @@ pub fn load(path: &Path) -> std::result::Result<Scene, SceneError> {
 /// [`load`] with what the caller brings.
 ///
 /// # Errors
-/// As [`load`]; or the intrinsics do not fit the photograph.
+/// As [`load`]; or the intrinsics do not fit the photograph, or a file lies outside the sandbox.
 pub fn load_with(path: &Path, given: Given) -> std::result::Result<Scene, SceneError> {
     let bytes = read_file(path, MAX_TEXT_BYTES).map_err(|reason| SceneError::Unreadable {
         path: path.to_path_buf(),
         reason,
     })?;
-    read_scene(&Source::new(path, bytes)?, given)
+    let mut source = Source::new(path, bytes)?;
+    source.sandbox = given.sandbox.then(|| Sandbox::of_scene(path));
+    read_scene(&source, given)
 }
 
 pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {

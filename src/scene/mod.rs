@@ -16,6 +16,7 @@ mod object;
 mod photo;
 mod pose;
 pub(crate) mod reader;
+mod sandbox;
 mod scan;
 mod settings;
 pub(crate) mod shape;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::{DMat3, DMat4, DVec3};
 
 use super::error::{Result, SceneError};
-use super::gltf::{GltfScene, PlacedLight, Problem, PunctualLight, load_animated};
+use super::gltf::{GltfScene, PlacedLight, Problem, PunctualLight, load_within};
 use super::material::{lambertian, read_material};
 use super::pose::read_transform;
 use super::reader::{Choice, Node, Table};
@@ -127,7 +127,7 @@ impl<'w> ObjectReader<'w> {
         let mesh = match self.meshes.get(&key) {
             Some(mesh) => Rc::clone(mesh),
             None => {
-                let mesh = load_animated(&path, key.1.as_deref())
+                let mesh = load_within(&path, key.1.as_deref(), node.sandbox())
                     .map_err(|error| node.file_error(&path, &advise(&error.problem)))?;
                 self.warnings
                     .extend(node.file_warnings(mesh.warnings.clone()));

@@ -10,6 +10,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{Result, SceneError, Source};
+use super::sandbox::Sandbox;
 
 /// Lengths and coordinates beyond this have no meaning in f32 arithmetic that squares them.
 pub(crate) const MAX_MAGNITUDE: f64 = 1e15;
@@ -240,7 +241,7 @@ impl<'a> Node<'a> {
 
     /// The file that this string names, relative to the scene file's folder.
     pub fn existing_file(&self) -> Result<PathBuf> {
-        let path = self.source.resolve(self.string()?);
+        let path = self.named_path()?;
         if path.is_file() {
             self.source.files.borrow_mut().push(path.clone());
             return Ok(path);
@@ -252,9 +253,25 @@ impl<'a> Node<'a> {
         ))
     }
 
+    /// Where the files have to lie that a file which this string names may name itself.
+    pub fn sandbox(&self) -> Option<&'a Sandbox> {
+        self.source.sandbox.as_ref()
+    }
+
+    fn named_path(&self) -> Result<PathBuf> {
+        let path = self.source.resolve(self.string()?);
+        match self.sandbox().and_then(|sandbox| sandbox.refusal(&path)) {
+            Some(refusal) => {
+                let message = format!("`{}` {refusal}", self.label);
+                Err(self.source.error(self.offset, message))
+            }
+            None => Ok(path),
+        }
+    }
+
     /// Notes the file that this string names, if there is one: it is not read, but belongs to the scene.
     pub fn note_file(&self) -> Result<()> {
-        let path = self.source.resolve(self.string()?);
+        let path = self.named_path()?;
         if path.is_file() {
             self.source.files.borrow_mut().push(path);
         }

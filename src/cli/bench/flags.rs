@@ -6,11 +6,12 @@ use clap::Args;
 
 use super::docs::Docs;
 use crate::bench::{Machine, Method, Plan, shrink};
+use crate::cli::scene_flags::SceneFlags;
 use crate::cli::threads::ThreadsFlag;
 use crate::cli::values::{choice, rays_per_pixel};
 use crate::cli::{Failure, Outcome, say};
 use crate::files;
-use crate::scene::{self, BackendChoice, Composite, Estimator, SamplerKind, Scene};
+use crate::scene::{BackendChoice, Composite, Estimator, SamplerKind, Scene};
 
 /// Where figures go, and on how many threads they are made.
 #[derive(Debug, Args)]
@@ -195,12 +196,13 @@ impl RaysFlag {
 /// Scenes by different names, to be rendered by `backend`; `by` divides their sizes.
 pub(super) fn load_scenes(
     paths: &[PathBuf],
+    flags: SceneFlags,
     by: u32,
     backend: BackendChoice,
 ) -> Result<Vec<Scene>, Failure> {
     let mut scenes: Vec<Scene> = Vec::new();
     for path in paths {
-        let mut scene = shrink(scene::load(path)?, by);
+        let mut scene = shrink(flags.load(path)?, by);
         scene.settings.backend = backend;
         for warning in &scene.warnings {
             say("warning", warning);

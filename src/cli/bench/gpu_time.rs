@@ -8,6 +8,7 @@ use super::command_line;
 use super::files::write_json;
 use super::flags::{OutputFlags, RaysFlag, finish, load_scenes};
 use crate::bench::{Machine, gpu_time, gpu_time_markdown, gpu_time_text};
+use crate::cli::scene_flags::SceneFlags;
 use crate::cli::{Failure, Outcome, interrupt, print, progress};
 use crate::scene::BackendChoice;
 
@@ -19,6 +20,8 @@ pub(super) struct Arguments {
     /// Scene files
     #[arg(required = true, value_name = "SCENE")]
     scenes: Vec<PathBuf>,
+    #[command(flatten)]
+    scene: SceneFlags,
     #[command(flatten)]
     rays: RaysFlag,
     /// Divide the scenes' width and height
@@ -32,7 +35,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let docs = arguments.output.start("gpu-time")?;
     let machine = Machine::this(true);
     let interrupted = interrupt::watch()?;
-    let scenes = load_scenes(&arguments.scenes, arguments.shrink, BackendChoice::Cpu)?;
+    let scenes = load_scenes(
+        &arguments.scenes,
+        arguments.scene,
+        arguments.shrink,
+        BackendChoice::Cpu,
+    )?;
     let folder = arguments.output.make_folder(&["gpu-time.json"])?;
     let rays_per_pixel = arguments.rays.ascending();
     let steps = progress::Steps::new((scenes.len() * rays_per_pixel.len()) as u64);

@@ -18,6 +18,7 @@ use crate::bench::{
     FORMAT, Machine, Method, Plan, ReferenceGoal, Report, Source, markdown, measure, reference,
     text,
 };
+use crate::cli::scene_flags::SceneFlags;
 use crate::cli::values::{above_zero, camera_noise, choice, rays_per_pixel};
 use crate::cli::{Failure, Outcome, interrupt, print, progress, say};
 use crate::renderer::{CameraNoise, SCRAMBLES, Skip, Watcher};
@@ -49,6 +50,8 @@ pub(super) struct Arguments {
     /// Scene files
     #[arg(value_name = "SCENE")]
     scenes: Vec<PathBuf>,
+    #[command(flatten)]
+    scene: SceneFlags,
     #[command(flatten)]
     pub rays: RaysFlag,
     #[command(flatten)]
@@ -226,7 +229,12 @@ fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
         true => BackendChoice::Gpu,
         false => BackendChoice::Cpu,
     };
-    let scenes = load_scenes(&arguments.scenes, arguments.runs.shrink, backend)?;
+    let scenes = load_scenes(
+        &arguments.scenes,
+        arguments.scene,
+        arguments.runs.shrink,
+        backend,
+    )?;
     let plots = scenes.iter().flat_map(|scene| {
         ["time.svg", "time.png", "rays.svg", "rays.png"]
             .map(|axis| format!("{}-error-{axis}", scene.name))

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::beam::Beam;
 use crate::accel::Ray;
-use crate::light::cones::{Cones, cone_solid_angle_fraction, direction_meets_spheres};
+use crate::light::cones::{cone_solid_angle_fraction, cones_at, direction_meets_spheres};
 use crate::light::environment::env_sample;
 use crate::math::{hash_combine, hash_u32, luminance, uniform_from_bits};
 use crate::packed::{
@@ -101,7 +101,7 @@ pub fn importance(scene: &PackedScene, beam: &Beam, lights: &PilotLights<'_>) ->
         normal
     };
     let mut importance =
-        lights.reach_gain * cone_solid_angle_fraction(&Cones::at(&scene.frame, position, normal));
+        lights.reach_gain * cone_solid_angle_fraction(&cones_at(&scene.frame, position, normal));
     if lights
         .examined
         .iter()

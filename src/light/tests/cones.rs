@@ -6,9 +6,9 @@ use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
 use super::{Random, fit, pearson};
+use crate::light::blocking::light_may_be_blocked;
 use crate::light::cones::{
-    Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
-    light_may_be_blocked,
+    cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres,
 };
 use crate::packed::{Frame, LIGHT_QUAD, Light};
 
@@ -51,18 +51,18 @@ fn samples_follow_the_mixture() {
         let mut random = Random::new(21);
         let mut draw = || {
             let s = cone_sample(
-                &Cones::at(&frame, Vec3::ZERO, n),
+                &cones_at(&frame, Vec3::ZERO, n),
                 random.uniform(),
                 random.uniforms(),
             );
             assert!(s.pdf > 0.0 && (s.direction.length() - 1.0).abs() < 1e-6);
             assert_eq!(
                 s.pdf,
-                cone_pdf(&Cones::at(&frame, Vec3::ZERO, n), s.direction)
+                cone_pdf(&cones_at(&frame, Vec3::ZERO, n), s.direction)
             );
             Some(s.direction)
         };
-        let pdf = |d: Vec3| f64::from(cone_pdf(&Cones::at(&frame, Vec3::ZERO, n), d));
+        let pdf = |d: Vec3| f64::from(cone_pdf(&cones_at(&frame, Vec3::ZERO, n), d));
         let result = fit(100_000, &mut draw, pdf);
         assert!(
             (result.integral - 1.0).abs() < 0.01,
@@ -98,7 +98,7 @@ fn tiny_cones_keep_their_distribution() {
         let mut counts = vec![0.0; 64];
         for _ in 0..64_000 {
             let s = cone_sample(
-                &Cones::at(&frame, Vec3::ZERO, Vec3::Y),
+                &cones_at(&frame, Vec3::ZERO, Vec3::Y),
                 random.uniform(),
                 random.uniforms(),
             );
@@ -141,7 +141,7 @@ fn a_sphere_covers_its_form_factor() {
         let mut sum = 0.0;
         for _ in 0..n {
             let s = cone_sample(
-                &Cones::at(&frame, Vec3::ZERO, Vec3::Y),
+                &cones_at(&frame, Vec3::ZERO, Vec3::Y),
                 random.uniform(),
                 random.uniforms(),
             );
@@ -156,7 +156,7 @@ fn a_sphere_covers_its_form_factor() {
         let want = PI * (f64::from(radius) / distance).powi(2) * f64::from(height) / distance;
         assert!((sum / want - 1.0).abs() < 0.01, "{sum} {want}");
         assert!((sum / (want * 1.03) - 1.0).abs() > 0.01);
-        let fraction = f64::from(cone_solid_angle_fraction(&Cones::at(
+        let fraction = f64::from(cone_solid_angle_fraction(&cones_at(
             &frame,
             Vec3::ZERO,
             Vec3::Y,
@@ -169,15 +169,15 @@ fn a_sphere_covers_its_form_factor() {
 fn only_cones_that_reach_above_the_horizon_count() {
     let above = |y: f32| {
         let frame = frame(&[[5.0, y, 0.0, 1.0]]);
-        cone_sample(&Cones::at(&frame, Vec3::ZERO, Vec3::Y), 0.5, [0.5; 2]).pdf > 0.0
+        cone_sample(&cones_at(&frame, Vec3::ZERO, Vec3::Y), 0.5, [0.5; 2]).pdf > 0.0
     };
     assert!(above(0.5) && above(-0.999) && !above(-1.01));
     assert_eq!(
-        cone_sample(&Cones::at(&frame(&[]), Vec3::ZERO, Vec3::Y), 0.5, [0.5; 2]).pdf,
+        cone_sample(&cones_at(&frame(&[]), Vec3::ZERO, Vec3::Y), 0.5, [0.5; 2]).pdf,
         0.0
     );
     assert_eq!(
-        cone_pdf(&Cones::at(&frame(&[]), Vec3::ZERO, Vec3::Y), Vec3::Y),
+        cone_pdf(&cones_at(&frame(&[]), Vec3::ZERO, Vec3::Y), Vec3::Y),
         0.0
     );
 }

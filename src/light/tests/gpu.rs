@@ -6,7 +6,7 @@ use super::{Random, lit_by, map_environment};
 use crate::gpu::harness::{Probe, test_device};
 use crate::gpu::{Features, SceneBuffers, SceneParts};
 use crate::light::cones::{
-    Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres,
+    cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres,
 };
 use crate::light::environment::env_radiance;
 use crate::light::lights::{env_arriving, light_pdf_hit, light_sample, light_select};
@@ -24,16 +24,16 @@ output_vec3(4u, s.radiance);
 output_f32(7u, s.pdf);
 output_f32(8u, env_arriving(direction).pdf);
 output_vec3(9u, env_radiance(direction));
-let c = cone_sample(position, direction, u.x, u.yz);
+let c = cone_sample(cones_at(position, direction), u.x, u.yz);
 output_vec3(12u, c.direction);
 output_f32(15u, c.pdf);
-output_f32(16u, cone_pdf(position, direction, s.direction));
-output_f32(17u, cone_solid_angle_fraction(position, direction));
+output_f32(16u, cone_pdf(cones_at(position, direction), s.direction));
+output_f32(17u, cone_solid_angle_fraction(cones_at(position, direction)));
 output_f32(18u, select(0.0, 1.0, direction_meets_spheres(position, direction)));
 output_f32(19u, light_pdf_hit(light_select(u.x, u.w), position, s.direction, s.distance));
 ";
 const PRELUDE: &str = "
-import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, direction_meets_spheres};
+import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres};
 import package::light::environment::env_radiance;
 import package::light::lights::{env_arriving, light_pdf_hit, light_sample, light_select};
 ";
@@ -46,7 +46,7 @@ fn on_the_cpu(scene: &PackedScene, input: &[f32]) -> [f32; OUTPUTS] {
     let frame = &scene.frame;
     let light = light_select(scene, u[0], u[3]);
     let s = light_sample(scene, light, position, [u[1], u[2]]);
-    let c = cone_sample(&Cones::at(frame, position, direction), u[0], [u[1], u[2]]);
+    let c = cone_sample(&cones_at(frame, position, direction), u[0], [u[1], u[2]]);
     let radiance = env_radiance(scene, direction);
     [
         s.direction.x,
@@ -65,8 +65,8 @@ fn on_the_cpu(scene: &PackedScene, input: &[f32]) -> [f32; OUTPUTS] {
         c.direction.y,
         c.direction.z,
         c.pdf,
-        cone_pdf(&Cones::at(frame, position, direction), s.direction),
-        cone_solid_angle_fraction(&Cones::at(frame, position, direction)),
+        cone_pdf(&cones_at(frame, position, direction), s.direction),
+        cone_solid_angle_fraction(&cones_at(frame, position, direction)),
         if direction_meets_spheres(frame, position, direction) {
             1.0
         } else {

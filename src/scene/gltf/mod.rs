@@ -25,6 +25,7 @@ use gltf::json::validation::Checked;
 
 use super::Instance;
 use super::animation::InstanceAnimation;
+use super::sandbox::Sandbox;
 use container::malformed;
 use document::{Document, Node};
 use notes::{Note, Notes};
@@ -164,23 +165,43 @@ pub fn load_gltf(path: &Path) -> Result<GltfScene, GltfError> {
 /// # Errors
 /// As [`load_gltf`]; or there is no such animation, or it is broken.
 pub fn load_animated(path: &Path, animation: Option<&str>) -> Result<GltfScene, GltfError> {
-    load(path, animation).map_err(|problem| GltfError {
+    load_within(path, animation, None)
+}
+
+/// [`load_animated`] of a file all of whose buffers and images lie in the sandbox.
+pub(super) fn load_within(
+    path: &Path,
+    animation: Option<&str>,
+    sandbox: Option<&Sandbox>,
+) -> Result<GltfScene, GltfError> {
+    load(path, animation, sandbox).map_err(|problem| GltfError {
         path: path.to_path_buf(),
         problem,
     })
 }
 
-fn load(path: &Path, wanted: Option<&str>) -> Result<GltfScene, Problem> {
+fn load(
+    path: &Path,
+    wanted: Option<&str>,
+    sandbox: Option<&Sandbox>,
+) -> Result<GltfScene, Problem> {
     let container = container::read_container(path)?;
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
     let document = Document::new(container, folder)?;
+    let files = document.files();
+    if let Some(refusal) = sandbox.and_then(|sandbox| {
+        let mut refusals = files.iter().filter_map(|file| sandbox.refusal(file));
+        refusals.next()
+    }) {
+        return Err(container::malformed("a URI", refusal));
+    }
     let mut notes = Notes::default();
     check_extensions(&document, &mut notes)?;
 
     let mut meshes = mesh::Meshes::new(&document);
     let mut materials = material::Materials::new(&document);
     let mut scene = GltfScene {
-        files: document.files(),
+        files,
         ..GltfScene::default()
     };
     let placed = placed_nodes(&document, &mut notes)?;

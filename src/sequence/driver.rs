@@ -5,14 +5,9 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::Arguments;
 use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
-use super::report::{Frames, Seconds, Stats};
-use crate::cli::progress::Steps;
-use crate::cli::render::say_idle;
-use crate::cli::terminal::print_aside;
-use crate::cli::{Failure, Outcome, interrupt, print, say};
-use crate::output::{check_writable, write_text};
+use super::report::{FrameCounts, SequenceSeconds, SequenceStats};
+use super::{Event, SequenceError, SequenceOptions};
 use crate::packed::next_anchor;
 use crate::renderer::{
     Budget, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
@@ -27,81 +22,93 @@ use crate::video::{FrameSink, FrameSource, Header, SinkPlan, VideoFrame};
 /// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
 const REACH_FRAMES: f64 = 1.5;
 
-pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let files = Files::read(arguments)?;
-    let frames = arguments.frames.as_deref();
-    let output = arguments.output.as_deref().unwrap_or(Path::new("-"));
-    let frames = frames.ok_or_else(|| {
-        Failure(
+/// What became of a sequence.
+#[derive(Debug)]
+pub struct RenderedSequence {
+    pub stats: SequenceStats,
+    /// All frames are there; else it was cancelled, and the same options go on with it.
+    pub complete: bool,
+}
+
+/// Renders the frames one after the other. Those that an earlier call with the same options finished are kept; once `watcher` cancels, it ends
+/// with the frames that are finished. `hear` is told what happens; `watcher` hears of each frame's rays.
+///
+/// # Errors
+/// Something cannot be read, does not fit together, or cannot be written. Frames that are finished stay.
+pub fn render_sequence(
+    options: &SequenceOptions,
+    watcher: &Watcher<'_>,
+    hear: &dyn Fn(&Event<'_>),
+) -> Result<RenderedSequence, SequenceError> {
+    let files = Files::read(options)?;
+    let frames = options.frames.as_deref().ok_or_else(|| {
+        SequenceError::Unfit(
             "--frames is absent; expected a folder of pictures, a .y4m file, or -; add it"
                 .to_owned(),
         )
     })?;
-    if let Some(path) = &arguments.flags.stats {
-        check_writable(path)?;
-    }
     let mut source = FrameSource::open(frames)?;
-    let rate = known_rate(arguments, &files.trajectory, Some(&source));
+    let rate = known_rate(options, &files.trajectory, Some(&source));
     let views = views(&files.trajectory, rate, source.is_stream())?;
-    check_frames(arguments, &source, &views)?;
+    check_frames(options, &source, &views)?;
     let names: Option<Vec<FrameName>> = source.names().map(|names| {
         names
             .into_iter()
-            .filter(|name| in_range(arguments, name))
+            .filter(|name| in_range(options, name))
             .collect()
     });
-    if let (Some((from, to)), None) = (arguments.focus_pull, &names)
-        && arguments.range.is_none()
+    if let (Some((from, to)), None) = (options.focus_pull_m, &names)
+        && options.range.is_none()
     {
-        return Err(Failure(format!(
+        return Err(SequenceError::Unfit(format!(
             "--focus-pull {from}..{to} of a stream whose length is not known; expected a range; give --range"
         )));
     }
-    let interrupted = interrupt::watch()?;
-    let names = names.unwrap_or_default();
-    let bar = Steps::new(names.len() as u64);
+    hear(&Event::Plan {
+        frames: names.as_ref().map(Vec::len),
+    });
     let mut sequence = Sequence {
-        arguments,
+        options,
         files: &files,
         views: &views,
         rate,
-        span: span(arguments, &source),
-        names,
-        output,
+        span: span(options, &source),
+        names: names.unwrap_or_default(),
+        hear,
         started: None,
-        frames: Frames::default(),
-        seconds: Seconds::default(),
+        frames: FrameCounts::default(),
+        seconds: SequenceSeconds::default(),
         rays: RayCounts::default(),
         non_finite_samples: 0,
     };
-    let outcome = loop {
-        if interrupted.is_set() {
-            break Outcome::Interrupted;
+    let complete = loop {
+        if watcher.is_cancelled() {
+            break false;
         }
         let begin = Instant::now();
-        let wanted = |name: &FrameName| in_range(arguments, name);
+        let wanted = |name: &FrameName| in_range(options, name);
         let Some((name, frame)) = source.next(&wanted)? else {
-            break Outcome::Done;
+            break true;
         };
         sequence.seconds.load += begin.elapsed().as_secs_f64();
-        if arguments.range.is_some_and(|(_, to)| name.number >= to) {
-            break Outcome::Done;
+        if options.range.is_some_and(|(_, to)| name.number >= to) {
+            break true;
         }
         let Some(frame) = frame else { continue };
-        bar.say(&name.label);
+        let (label, number) = (name.label.as_str(), name.number);
+        hear(&Event::Begins { label, number });
         let header = source.header().cloned();
-        if !sequence.take(&name, frame, header, &|| interrupted.is_set())? {
-            break Outcome::Interrupted;
+        if !sequence.take(&name, frame, header, watcher)? {
+            break false;
         }
-        bar.step();
+        hear(&Event::Ends { label, number });
     };
-    bar.clear();
-    sequence.end(outcome)
+    sequence.end(complete)
 }
 
 /// The first and the last frame's number, where they are known: the focus is pulled between them.
-fn span(arguments: &Arguments, source: &FrameSource) -> Option<(u32, u32)> {
-    if let Some((from, to)) = arguments.range {
+fn span(options: &SequenceOptions, source: &FrameSource) -> Option<(u32, u32)> {
+    if let Some((from, to)) = options.range {
         return Some((from, to - 1));
     }
     let names = source.names()?;
@@ -109,7 +116,7 @@ fn span(arguments: &Arguments, source: &FrameSource) -> Option<(u32, u32)> {
 }
 
 struct Sequence<'a> {
-    arguments: &'a Arguments,
+    options: &'a SequenceOptions,
     files: &'a Files,
     views: &'a Views<'a>,
     /// Frames a second, where known.
@@ -117,10 +124,10 @@ struct Sequence<'a> {
     span: Option<(u32, u32)>,
     /// The frames to come, where they are known.
     names: Vec<FrameName>,
-    output: &'a Path,
+    hear: &'a dyn Fn(&Event<'_>),
     started: Option<Started>,
-    frames: Frames,
-    seconds: Seconds,
+    frames: FrameCounts,
+    seconds: SequenceSeconds,
     rays: RayCounts,
     non_finite_samples: u64,
 }
@@ -148,11 +155,11 @@ impl Sequence<'_> {
         name: &FrameName,
         frame: VideoFrame,
         header: Option<Header>,
-        interrupted: &(dyn Fn() -> bool + Sync),
-    ) -> Result<bool, Failure> {
+        watcher: &Watcher<'_>,
+    ) -> Result<bool, SequenceError> {
         let view = self.views.of(name)?;
         for warning in &frame.warnings {
-            say("warning", &format!("{}: {warning}", name.label));
+            (self.hear)(&Event::Warning(format!("{}: {warning}", name.label)));
         }
         let size = (frame.photo.width, frame.photo.height);
         let started = match self.started.take() {
@@ -161,7 +168,7 @@ impl Sequence<'_> {
         };
         let started = self.started.insert(started);
         if size != started.size {
-            return Err(Failure(format!(
+            return Err(SequenceError::Unfit(format!(
                 "{}: it has {} x {} pixels where the frames before have {} x {}; expected frames of one size; scale it, then go on with the same command",
                 name.label, size.0, size.1, started.size.0, started.size.1
             )));
@@ -185,7 +192,7 @@ impl Sequence<'_> {
         };
         let camera = match self.files.intrinsics_of(&view) {
             Some(intrinsics) => (intrinsics.camera(size, world_from_camera)).map_err(|problem| {
-                Failure(format!("{}: {problem}; expected intrinsics of the frames' size; calibrate at that size, or scale the frames", name.label))
+                SequenceError::Unfit(format!("{}: {problem}; expected intrinsics of the frames' size; calibrate at that size, or scale the frames", name.label))
             })?,
             None => Camera {
                 world_from_camera,
@@ -201,7 +208,7 @@ impl Sequence<'_> {
                 time_secs,
             });
         let lens = Lens {
-            focus_distance_m: pulled_focus(self.arguments.focus_pull, self.span, name.number)
+            focus_distance_m: pulled_focus(self.options.focus_pull_m, self.span, name.number)
                 .or(view.focus_distance_m)
                 .unwrap_or(started.lens.focus_distance_m),
             ..started.lens
@@ -211,12 +218,16 @@ impl Sequence<'_> {
             // Fitted once, to the first posed frame of the range, whether or not that one is finished.
             scene.photo = Some(frame.photo.clone());
             scene.camera = camera.clone();
-            let options = RendererOptions {
-                without: self.arguments.flags.without(),
+            let with = RendererOptions {
+                without: self.options.without,
                 ..RendererOptions::default()
             };
-            let renderer = Renderer::new(scene, options, &Watcher::none())?;
-            say_idle(&renderer, None);
+            let renderer = Renderer::new(scene, with, &watcher.to_the_end())?;
+            let estimator = renderer.scene().settings.estimator;
+            let on_gpu = renderer.gpu_device().is_some();
+            for (saving, reason) in renderer.without().idle(estimator, on_gpu, None) {
+                (self.hear)(&Event::Idle { saving, reason });
+            }
             let seconds = renderer.seconds();
             self.seconds.compile += seconds.compile;
             self.seconds.first_build += begin.elapsed().as_secs_f64() - seconds.compile;
@@ -245,9 +256,9 @@ impl Sequence<'_> {
         )?;
         self.seconds.edit += begin.elapsed().as_secs_f64();
         let begin = Instant::now();
-        renderer.advance(Budget::Complete, &Watcher::none().cancelled_by(interrupted))?;
+        renderer.advance(Budget::Complete, watcher)?;
         self.seconds.render += begin.elapsed().as_secs_f64();
-        if interrupted() {
+        if watcher.is_cancelled() {
             return Ok(false);
         }
         let begin = Instant::now();
@@ -275,12 +286,12 @@ impl Sequence<'_> {
         self.frames.moving += u32::from(renderer.is_moving());
         self.non_finite_samples += renderer.film().non_finite_samples();
         for note in renderer.notes().iter().skip(started.notes) {
-            say("note", note);
+            (self.hear)(&Event::Note(note.to_string()));
         }
         started.notes = renderer.notes().len();
         if self.frames.rendered == 1 {
             for note in &notes {
-                say("note", note);
+                (self.hear)(&Event::Note(note.to_string()));
             }
         }
         let begin = Instant::now();
@@ -295,20 +306,20 @@ impl Sequence<'_> {
         view: &FrameView,
         frame: &VideoFrame,
         header: Option<Header>,
-    ) -> Result<Started, Failure> {
-        let mut scene = self
-            .files
-            .scene(self.arguments, view, Some(frame.photo.clone()))?;
+    ) -> Result<Started, SequenceError> {
+        let mut scene =
+            self.files
+                .scene(self.options, view, Some(frame.photo.clone()), self.hear)?;
         check_rate(&scene, self.rate, self.views.have_own_times())?;
         let size = (frame.photo.width, frame.photo.height);
         // The photograph of the moment is no part of what the frames are made with.
         scene.photo = None;
-        let arguments = self.arguments;
+        let options = self.options;
         let fits = scene.settings.exposure == Exposure::Auto;
         // A file tells by their order which frames it holds.
-        let is_file = self.output.extension().is_some_and(|e| e == "y4m");
-        let scope = match fits || arguments.focus_pull.is_some() || is_file {
-            true => format!("{:?} {:?}", arguments.range, self.span),
+        let is_file = options.output.extension().is_some_and(|e| e == "y4m");
+        let scope = match fits || options.focus_pull_m.is_some() || is_file {
+            true => format!("{:?} {:?}", options.range, self.span),
             false => String::new(),
         };
         let poses = &self.files.trajectory;
@@ -317,23 +328,23 @@ impl Sequence<'_> {
             poses.entries, poses.intrinsics, self.files.intrinsics, self.rate
         );
         let may_be_gpu = scene.settings.backend != BackendChoice::Cpu;
-        let without = arguments.flags.without().of_pictures(may_be_gpu);
+        let without = options.without.of_pictures(may_be_gpu);
         let fingerprint = fingerprint_of([
             env!("CARGO_PKG_VERSION"),
             &scene.fingerprint(),
             &format!(
                 "{:?} {:?} {:?} {without:?}",
-                scene.settings, scene.stages, arguments.flags.png_bits
+                scene.settings, scene.stages, options.png_bits
             ),
             &trajectory,
-            &format!("{:?} {scope}", arguments.focus_pull),
+            &format!("{:?} {scope}", options.focus_pull_m),
         ]);
         let sink = FrameSink::open(SinkPlan {
-            path: self.output,
+            path: &options.output,
             fingerprint,
             header: header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate)),
-            png_bits: arguments.flags.png_bits,
-            overwrite: arguments.overwrite,
+            png_bits: options.png_bits,
+            overwrite: options.overwrite,
             names: self.names.clone(),
         })?;
         Ok(Started {
@@ -350,47 +361,25 @@ impl Sequence<'_> {
         })
     }
 
-    fn end(self, outcome: Outcome) -> Result<Outcome, Failure> {
+    fn end(self, complete: bool) -> Result<RenderedSequence, SequenceError> {
         let Some(started) = self.started else {
-            return Err(Failure(format!(
+            let frames = self.options.frames.as_deref().unwrap_or(Path::new("-"));
+            return Err(SequenceError::Unfit(format!(
                 "{}: no frame of the range was found; expected at least one; correct --range",
-                self.arguments
-                    .frames
-                    .as_deref()
-                    .unwrap_or(Path::new("-"))
-                    .display()
+                frames.display()
             )));
         };
-        if outcome == Outcome::Done {
+        if complete {
             started.sink.finish()?;
         }
-        let stats = Stats::new(
+        let stats = SequenceStats::new(
             self.frames,
             self.seconds,
             self.rays,
             self.non_finite_samples,
             started.renderer.as_ref(),
         );
-        if let Some(path) = &self.arguments.flags.stats {
-            write_text(path, &serde_json::to_string_pretty(&stats)?)?;
-        }
-        let text = stats.text(&self.output.display().to_string());
-        if self.output == Path::new("-") {
-            // Standard output is the film.
-            print_aside(&text);
-        } else {
-            print(&text)?;
-        }
-        if stats.non_finite_samples > 0 {
-            say(
-                "warning",
-                &format!(
-                    "{} samples were not finite and are left out",
-                    stats.non_finite_samples
-                ),
-            );
-        }
-        Ok(outcome)
+        Ok(RenderedSequence { stats, complete })
     }
 }
 

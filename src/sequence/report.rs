@@ -9,11 +9,12 @@ use crate::stages::StageSeconds;
 
 /// Seconds over all frames, by what they were spent on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub(super) struct Seconds {
+pub struct SequenceSeconds {
     /// Reading and decoding frames.
     pub load: f64,
     /// The first frame's acceleration structures and packing.
     pub first_build: f64,
+    /// GPU kernels.
     pub compile: f64,
     /// Pilot, camera, and what moved.
     pub edit: f64,
@@ -24,15 +25,16 @@ pub(super) struct Seconds {
     pub write: f64,
 }
 
-impl Seconds {
+impl SequenceSeconds {
     /// What is spent on every frame.
     fn of_frames(&self) -> f64 {
         self.load + self.edit + self.render + self.composite + self.stages.total() + self.write
     }
 }
 
+/// Frames by what became of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub(super) struct Frames {
+pub struct FrameCounts {
     pub rendered: u32,
     /// Their poses are null.
     pub passed_through: u32,
@@ -42,10 +44,11 @@ pub(super) struct Frames {
     pub moving: u32,
 }
 
+/// What a sequence came to.
 #[derive(Debug, Serialize)]
-pub(super) struct Stats {
-    pub frames: Frames,
-    pub seconds: Seconds,
+pub struct SequenceStats {
+    pub frames: FrameCounts,
+    pub seconds: SequenceSeconds,
     /// Rendered frames over the seconds spent on them.
     pub frames_per_second: f64,
     pub rays: u64,
@@ -56,10 +59,10 @@ pub(super) struct Stats {
     pub peak_memory_mib: Option<f64>,
 }
 
-impl Stats {
+impl SequenceStats {
     pub(super) fn new(
-        frames: Frames,
-        seconds: Seconds,
+        frames: FrameCounts,
+        seconds: SequenceSeconds,
         rays: RayCounts,
         non_finite_samples: u64,
         renderer: Option<&Renderer>,
@@ -80,8 +83,9 @@ impl Stats {
         }
     }
 
-    pub(super) fn text(&self, output: &str) -> String {
-        let Frames {
+    /// A few lines for the user, `output` being where the frames went.
+    pub fn text(&self, output: &str) -> String {
+        let FrameCounts {
             rendered,
             passed_through,
             kept,

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use super::Arguments;
-use crate::cli::{Failure, say};
+use super::{Event, SequenceError, SequenceOptions};
 use crate::scene::trajectory::{
     FrameName, FrameView, Intrinsics, Trajectory, Views, read_intrinsics,
 };
@@ -19,10 +18,10 @@ pub(super) struct Files {
 }
 
 impl Files {
-    pub(super) fn read(arguments: &Arguments) -> Result<Self, Failure> {
-        let path = arguments.intrinsics.as_deref();
+    pub(super) fn read(options: &SequenceOptions) -> Result<Self, SequenceError> {
+        let path = options.intrinsics.as_deref();
         Ok(Self {
-            trajectory: Trajectory::read(&arguments.trajectory)?,
+            trajectory: Trajectory::read(&options.trajectory)?,
             intrinsics: path.map(read_intrinsics).transpose()?,
         })
     }
@@ -35,18 +34,20 @@ impl Files {
     /// The scene with a frame for its photograph.
     pub(super) fn scene(
         &self,
-        arguments: &Arguments,
+        options: &SequenceOptions,
         view: &FrameView,
         photo: Option<Photo>,
-    ) -> Result<Scene, Failure> {
+        hear: &dyn Fn(&Event<'_>),
+    ) -> Result<Scene, SequenceError> {
         let given = Given {
             photo,
             intrinsics: self.intrinsics_of(view),
+            sandbox: options.sandbox,
         };
-        let mut scene = scene::load_with(&arguments.scene, given)?;
-        scene.settings.apply(&arguments.flags.overrides());
+        let mut scene = scene::load_with(&options.scene, given)?;
+        scene.settings.apply(&options.overrides);
         for warning in &scene.warnings {
-            say("warning", warning);
+            hear(&Event::Warning(warning.clone()));
         }
         Ok(scene)
     }
@@ -54,13 +55,13 @@ impl Files {
 
 /// Frames a second: of the command line, the trajectory or the stream.
 pub(super) fn known_rate(
-    arguments: &Arguments,
+    options: &SequenceOptions,
     trajectory: &Trajectory,
     source: Option<&FrameSource>,
 ) -> Option<f64> {
     let of_stream = || source?.header()?.frames_per_second();
-    arguments
-        .fps
+    options
+        .frames_per_second
         .or(trajectory.frames_per_second)
         .or_else(of_stream)
 }
@@ -69,7 +70,7 @@ pub(super) fn views<'a>(
     trajectory: &'a Trajectory,
     rate: Option<f64>,
     is_stream: bool,
-) -> Result<Views<'a>, Failure> {
+) -> Result<Views<'a>, SequenceError> {
     Ok(Views::new(
         trajectory,
         Some(rate.unwrap_or(ANY_RATE)),
@@ -82,10 +83,10 @@ pub(super) fn check_rate(
     scene: &Scene,
     rate: Option<f64>,
     views_have_times: bool,
-) -> Result<(), Failure> {
+) -> Result<(), SequenceError> {
     let timed = scene.shutter.is_some() || scene.objects.iter().any(Object::is_animated);
     if timed && rate.is_none() && !views_have_times {
-        return Err(Failure(
+        return Err(SequenceError::Unfit(
             "the scene has [shutter] or moving objects, but nothing tells the frames' times; expected a frame rate; give --fps".to_owned(),
         ));
     }
@@ -94,32 +95,32 @@ pub(super) fn check_rate(
 
 /// All numbers of the range are there, and each has its entry, as far as can be known before the frames are read.
 pub(super) fn check_frames(
-    arguments: &Arguments,
+    options: &SequenceOptions,
     source: &FrameSource,
     views: &Views<'_>,
-) -> Result<(), Failure> {
+) -> Result<(), SequenceError> {
     let Some(names) = source.names() else {
         return Ok(());
     };
-    let frames = arguments.frames.as_deref().unwrap_or(Path::new("-"));
+    let frames = options.frames.as_deref().unwrap_or(Path::new("-"));
     let wanted: Vec<&FrameName> = names
         .iter()
-        .filter(|name| in_range(arguments, name))
+        .filter(|name| in_range(options, name))
         .collect();
     let (Some(first), Some(last)) = (wanted.first(), wanted.last()) else {
-        return Err(Failure(format!(
+        return Err(SequenceError::Unfit(format!(
             "{}: it holds no frame of the range; expected frames numbered {} to {}; correct --range",
             frames.display(),
             names.first().map_or(0, |name| name.number),
             names.last().map_or(0, |name| name.number)
         )));
     };
-    if !arguments.allow_gaps {
-        let (from, to) = arguments.range.unwrap_or((first.number, last.number + 1));
+    if !options.allow_gaps {
+        let (from, to) = options.range.unwrap_or((first.number, last.number + 1));
         let mut numbers = wanted.iter().map(|name| name.number).peekable();
         for number in from..to {
             if numbers.next_if_eq(&number).is_none() {
-                return Err(Failure(format!(
+                return Err(SequenceError::Unfit(format!(
                     "{}: frame {number} is missing; expected all frames from {from} to {}; add it, or say --allow-gaps",
                     frames.display(),
                     to - 1
@@ -133,8 +134,8 @@ pub(super) fn check_frames(
     Ok(())
 }
 
-pub(super) fn in_range(arguments: &Arguments, name: &FrameName) -> bool {
-    match arguments.range {
+pub(super) fn in_range(options: &SequenceOptions, name: &FrameName) -> bool {
+    match options.range {
         Some((from, to)) => (from..to).contains(&name.number),
         None => true,
     }

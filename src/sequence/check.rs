@@ -1,4 +1,4 @@
-//! `mixray sequence --check`: poses against points that were seen.
+//! Poses against points that were seen.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -7,10 +7,9 @@ use std::path::Path;
 use bytemuck::Zeroable;
 use glam::DVec3;
 
-use super::Arguments;
 use super::plan::{Files, known_rate, views};
+use super::{Event, SequenceError, SequenceOptions};
 use crate::camera::lens::{camera_project, frame_camera, project};
-use crate::cli::{Failure, Outcome, print};
 use crate::decode::{MAX_TEXT_BYTES, read_text};
 use crate::packed::Frame;
 use crate::scene::trajectory::{EntryKey, FrameName, KnownPoint, Trajectory};
@@ -29,25 +28,43 @@ struct Errors {
     own: f64,
 }
 
-pub(super) fn run(arguments: &Arguments, points: Option<&Path>) -> Result<Outcome, Failure> {
-    let files = Files::read(arguments)?;
+/// How far projected points are from where they were seen.
+#[derive(Clone, Debug)]
+pub struct Reprojection {
+    /// A few lines for the user.
+    pub text: String,
+    /// The largest error, pixels.
+    pub worst_px: f64,
+}
+
+/// Projects points through the poses and renders nothing; `points` are those of a table
+/// (`frame,x_px,y_px,x_m,y_m,z_m`), or else the trajectory's own.
+///
+/// # Errors
+/// Something cannot be read, or no points are there.
+pub fn check_poses(
+    options: &SequenceOptions,
+    points: Option<&Path>,
+    hear: &dyn Fn(&Event<'_>),
+) -> Result<Reprojection, SequenceError> {
+    let files = Files::read(options)?;
     let points = match points {
         Some(path) => read_points(path)?,
         None => files.trajectory.known_points.clone(),
     };
     if points.is_empty() {
-        return Err(Failure(format!(
+        return Err(SequenceError::Unfit(format!(
             "{}: it holds no points that were seen; expected COLMAP's points3D.txt beside images.txt, or a table of points; give --check POINTS.csv",
             files.trajectory.path.display()
         )));
     }
-    let source = arguments
+    let source = options
         .frames
         .as_deref()
         .map(FrameSource::open)
         .transpose()?;
     let is_stream = source.as_ref().is_some_and(FrameSource::is_stream);
-    let rate = known_rate(arguments, &files.trajectory, source.as_ref());
+    let rate = known_rate(options, &files.trajectory, source.as_ref());
     let views = views(&files.trajectory, rate, is_stream)?;
     let mut errors: BTreeMap<String, Errors> = BTreeMap::new();
     let (mut used, mut without_pose, mut behind) = (0u64, 0u64, 0u64);
@@ -79,7 +96,7 @@ pub(super) fn run(arguments: &Arguments, points: Option<&Path>) -> Result<Outcom
             }
             (None, Some((camera, lens))) => (camera.clone(), Some(*lens)),
             (None, None) => {
-                let scene = files.scene(arguments, &view, None)?;
+                let scene = files.scene(options, &view, None, hear)?;
                 own_camera = Some((scene.camera.clone(), scene.lens));
                 (scene.camera, Some(scene.lens))
             }
@@ -101,15 +118,11 @@ pub(super) fn run(arguments: &Arguments, points: Option<&Path>) -> Result<Outcom
         entry.own = entry.own.max(own_error(&camera, lens, point.world, pixel));
     }
     let text = table(&errors, used, without_pose, behind);
-    print(&text)?;
-    let worst = errors
+    let worst_px = errors
         .values()
         .flat_map(|e| e.seen.iter().copied())
         .fold(0.0, f64::max);
-    Ok(match worst <= arguments.max_error {
-        true => Outcome::Done,
-        false => Outcome::CheckFailed,
-    })
+    Ok(Reprojection { text, worst_px })
 }
 
 /// Distance between where the renderer's own arithmetic sees a point and where the pose puts it, pixels.
@@ -181,11 +194,12 @@ fn frame_of(key: &EntryKey, trajectory: &Trajectory) -> FrameName {
 }
 
 /// `frame,x_px,y_px,x_m,y_m,z_m` a line; `frame` is a number or a file name, the pixel may be empty.
-fn read_points(path: &Path) -> Result<Vec<KnownPoint>, Failure> {
-    let failure =
-        |line: usize, problem: String| Failure(format!("{}:{line}: {problem}", path.display()));
+fn read_points(path: &Path) -> Result<Vec<KnownPoint>, SequenceError> {
+    let failure = |line: usize, problem: String| {
+        SequenceError::Unfit(format!("{}:{line}: {problem}", path.display()))
+    };
     let text = read_text(path, MAX_TEXT_BYTES).map_err(|reason| {
-        Failure(format!(
+        SequenceError::Unfit(format!(
             "{}: it cannot be read ({reason}); expected a table of points; correct the path",
             path.display()
         ))

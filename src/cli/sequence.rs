@@ -1,0 +1,162 @@
+//! `mixray sequence`: a scene over the frames of a video, each with its own camera pose.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::picture_flags::PictureFlags;
+use super::progress::Steps;
+use super::render::say_idle;
+use super::terminal::print_aside;
+use super::values::whole_range;
+use super::{Failure, Outcome, interrupt, print, say};
+use crate::output::{check_writable, write_text};
+use crate::renderer::Watcher;
+use crate::sequence::{Event, RenderedSequence, SequenceOptions, check_poses, render_sequence};
+
+/// Renders a scene's virtual objects into the frames of a video
+///
+/// Flags win over the scene file. Frames that an earlier run of the same command finished are kept. Ctrl-C ends after what is finished.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Scene file (TOML); its photograph is not needed, nor are its intrinsics if the trajectory brings them
+    scene: PathBuf,
+    /// Folder of pictures, .y4m file, file of JPEG pictures one after the other, or - for Y4M on standard input
+    #[arg(long, value_name = "PATH")]
+    frames: Option<PathBuf>,
+    /// Poses: .toml or .json of this program, transforms.json of nerfstudio, COLMAP's text model (folder or images.txt), or a TUM trajectory
+    #[arg(long, value_name = "FILE")]
+    trajectory: PathBuf,
+    /// OpenCV calibration (YAML) in place of the intrinsics of trajectory and scene
+    #[arg(long, value_name = "FILE")]
+    intrinsics: Option<PathBuf>,
+    /// Folder for PNG files, .y4m file, or - for Y4M on standard output
+    #[arg(short, long, value_name = "PATH", required_unless_present = "check")]
+    output: Option<PathBuf>,
+    /// Only the frames with these numbers, FROM to TO - 1
+    #[arg(long, value_name = "FROM..TO", value_parser = whole_range)]
+    range: Option<(u32, u32)>,
+    /// Numbers may be missing among the frames of a folder
+    #[arg(long)]
+    allow_gaps: bool,
+    /// Frames a second, where neither the frames nor the trajectory tell
+    #[arg(long, value_name = "RATE", value_parser = positive)]
+    fps: Option<f64>,
+    /// Focus distance in metres over the range, from the first to the last frame, at a constant rate in 1/m
+    #[arg(long, value_name = "FROM..TO", value_parser = focus_pull)]
+    focus_pull: Option<(f64, f64)>,
+    /// Replace frames of another render
+    #[arg(long)]
+    overwrite: bool,
+    /// Check the poses against points (CSV: frame,x_px,y_px,x_m,y_m,z_m; for COLMAP its own) and render nothing
+    #[arg(long, value_name = "POINTS.csv", num_args = 0..=1)]
+    check: Option<Option<PathBuf>>,
+    /// Largest reprojection error that passes, pixels
+    #[arg(long, value_name = "PX", default_value_t = 2.0, value_parser = positive)]
+    max_error: f64,
+    #[command(flatten)]
+    flags: PictureFlags,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    arguments.flags.start_threads()?;
+    match &arguments.check {
+        Some(points) => check(arguments, points.as_deref()),
+        None => render(arguments),
+    }
+}
+
+impl Arguments {
+    fn options(&self) -> SequenceOptions {
+        SequenceOptions {
+            scene: self.scene.clone(),
+            overrides: self.flags.overrides(),
+            without: self.flags.without(),
+            frames: self.frames.clone(),
+            trajectory: self.trajectory.clone(),
+            intrinsics: self.intrinsics.clone(),
+            output: self.output.clone().unwrap_or_else(|| "-".into()),
+            range: self.range,
+            allow_gaps: self.allow_gaps,
+            frames_per_second: self.fps,
+            focus_pull_m: self.focus_pull,
+            overwrite: self.overwrite,
+            png_bits: self.flags.png_bits,
+            sandbox: self.flags.scene.sandbox,
+        }
+    }
+}
+
+fn check(arguments: &Arguments, points: Option<&Path>) -> Result<Outcome, Failure> {
+    let reprojection = check_poses(&arguments.options(), points, &tell)?;
+    print(&reprojection.text)?;
+    Ok(match reprojection.worst_px <= arguments.max_error {
+        true => Outcome::Done,
+        false => Outcome::CheckFailed,
+    })
+}
+
+fn render(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let options = arguments.options();
+    if let Some(path) = &arguments.flags.stats {
+        check_writable(path)?;
+    }
+    let interrupted = interrupt::watch()?;
+    let cancelled = || interrupted.is_set();
+    let steps = Steps::new(0);
+    let hear = |event: &Event<'_>| match event {
+        Event::Plan { frames } => steps.expect(frames.unwrap_or(0) as u64),
+        Event::Begins { label, .. } => steps.say(label),
+        Event::Ends { .. } => steps.step(),
+        told => steps.aside(|| tell(told)),
+    };
+    let watcher = Watcher::none().cancelled_by(&cancelled);
+    let rendered = render_sequence(&options, &watcher, &hear);
+    steps.clear();
+    let RenderedSequence { stats, complete } = rendered?;
+    if let Some(path) = &arguments.flags.stats {
+        write_text(path, &serde_json::to_string_pretty(&stats)?)?;
+    }
+    let text = stats.text(&options.output.display().to_string());
+    match options.output == Path::new("-") {
+        // Standard output is the film.
+        true => print_aside(&text),
+        false => print(&text)?,
+    }
+    if stats.non_finite_samples > 0 {
+        let message = format!(
+            "{} samples were not finite and are left out",
+            stats.non_finite_samples
+        );
+        say("warning", &message);
+    }
+    Ok(match complete {
+        true => Outcome::Done,
+        false => Outcome::Interrupted,
+    })
+}
+
+fn tell(event: &Event<'_>) {
+    match event {
+        Event::Warning(text) => say("warning", text),
+        Event::Note(text) => say("note", text),
+        Event::Idle { saving, reason } => say_idle(saving, reason),
+        Event::Plan { .. } | Event::Begins { .. } | Event::Ends { .. } => {}
+    }
+}
+
+fn positive(text: &str) -> Result<f64, &'static str> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x <= 1e6 => Ok(x),
+        _ => Err("expected a number above 0, at most 1000000"),
+    }
+}
+
+fn focus_pull(text: &str) -> Result<(f64, f64), &'static str> {
+    let ends = text.split_once("..");
+    let metres = |text: &str| text.parse::<f64>().ok().filter(|x| *x > 0.0);
+    match ends.and_then(|(from, to)| Some((metres(from)?, metres(to)?))) {
+        Some(ends) => Ok(ends),
+        None => Err("expected FROM..TO, two distances above 0 in metres, such as 0.4..2.5"),
+    }
+}

@@ -1,0 +1,134 @@
+//! A scene over the frames of a video, each with its own camera pose.
+//!
+//! ```no_run
+//! use mixray::renderer::Watcher;
+//! use mixray::sequence::{Event, SequenceOptions, render_sequence};
+//!
+//! # fn main() -> Result<(), mixray::sequence::SequenceError> {
+//! let options = SequenceOptions::new("scene.toml", "frames/", "poses.json", "out/");
+//! let rendered = render_sequence(&options, &Watcher::none(), &|event: &Event<'_>| {
+//!     if let Event::Ends { number, .. } = event {
+//!         eprintln!("frame {number} is there");
+//!     }
+//! })?;
+//! println!("{} frames", rendered.stats.frames.rendered);
+//! # Ok(())
+//! # }
+//! ```
+
+mod check;
+mod driver;
+mod plan;
+mod report;
+
+use std::path::PathBuf;
+
+pub use check::{Reprojection, check_poses};
+pub use driver::{RenderedSequence, render_sequence};
+pub use report::{FrameCounts, SequenceSeconds, SequenceStats};
+
+use crate::output::{OutputError, PngBits};
+use crate::renderer::{RenderError, Without};
+use crate::scene::trajectory::TrajectoryError;
+use crate::scene::{Overrides, SceneError};
+use crate::video::VideoError;
+
+/// What is rendered, over which frames, to where.
+#[derive(Clone, Debug)]
+pub struct SequenceOptions {
+    /// Scene file; its photograph is not needed, nor are its intrinsics if the trajectory brings them.
+    pub scene: PathBuf,
+    /// What wins over the scene file; frame n has the seed plus n.
+    pub overrides: Overrides,
+    /// Savings to do without.
+    pub without: Without,
+    /// Folder of pictures, .y4m file, file of JPEG pictures one after the other, or `-` for Y4M on standard input. Only
+    /// [`check_poses`] does without.
+    pub frames: Option<PathBuf>,
+    /// Poses, in any format that [`Trajectory::read`](crate::scene::trajectory::Trajectory::read) knows.
+    pub trajectory: PathBuf,
+    /// OpenCV calibration in place of the intrinsics of trajectory and scene.
+    pub intrinsics: Option<PathBuf>,
+    /// Folder for PNG files, .y4m file, or `-` for Y4M on standard output.
+    pub output: PathBuf,
+    /// Numbers of the frames to render, the end not included.
+    pub range: Option<(u32, u32)>,
+    /// Numbers may be missing among the frames of a folder.
+    pub allow_gaps: bool,
+    /// Where neither the frames nor the trajectory tell.
+    pub frames_per_second: Option<f64>,
+    /// Focus distance over the range, from the first to the last frame, at a constant rate in 1/m.
+    pub focus_pull_m: Option<(f64, f64)>,
+    /// Frames of another render are replaced; files that are read never are.
+    pub overwrite: bool,
+    /// 16 where a frame has 16, else 8.
+    pub png_bits: Option<PngBits>,
+    /// Refuses files outside the scene's folder that the scene names: for scenes of others.
+    pub sandbox: bool,
+}
+
+impl SequenceOptions {
+    /// All frames, everything else as the scene file says.
+    pub fn new(
+        scene: impl Into<PathBuf>,
+        frames: impl Into<PathBuf>,
+        trajectory: impl Into<PathBuf>,
+        output: impl Into<PathBuf>,
+    ) -> Self {
+        Self {
+            scene: scene.into(),
+            overrides: Overrides::default(),
+            without: Without::default(),
+            frames: Some(frames.into()),
+            trajectory: trajectory.into(),
+            intrinsics: None,
+            output: output.into(),
+            range: None,
+            allow_gaps: false,
+            frames_per_second: None,
+            focus_pull_m: None,
+            overwrite: false,
+            png_bits: None,
+            sandbox: false,
+        }
+    }
+}
+
+/// What is heard while a sequence is rendered.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event<'a> {
+    /// Before the first frame: how many there are, where that is known.
+    Plan { frames: Option<usize> },
+    /// A frame is taken up.
+    Begins { label: &'a str, number: u32 },
+    /// It is there: rendered, passed through, or kept from an earlier run.
+    Ends { label: &'a str, number: u32 },
+    /// Something in a file is ignored or doubtful.
+    Warning(String),
+    /// Something that the user may want to know.
+    Note(String),
+    /// A saving was left out in vain.
+    Idle {
+        saving: &'static str,
+        reason: &'static str,
+    },
+}
+
+/// Why a sequence cannot be rendered, in one line. Hints name the flags of `mixray sequence`, which the fields of [`SequenceOptions`] are
+/// called after.
+#[derive(Debug, thiserror::Error)]
+pub enum SequenceError {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+    #[error(transparent)]
+    Video(#[from] VideoError),
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// What was asked for does not fit together: "problem; expected ...; mend".
+    #[error("{0}")]
+    Unfit(String),
+}
