@@ -2,15 +2,21 @@
 
 use std::time::Duration;
 
-use cpu_time::ProcessTime;
-
-/// What the processors have spent on this process so far, in all of its threads; nothing where the system does not say.
+/// What the processors have spent on this process so far, in all of its threads; nothing where the system does not say, and in a library
+/// without the feature `cli`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ProcessorTime(Duration);
 
 impl ProcessorTime {
+    #[cfg(feature = "cli")]
     pub fn now() -> Self {
-        Self(ProcessTime::try_now().map_or(Duration::ZERO, |time| time.as_duration()))
+        let now = cpu_time::ProcessTime::try_now();
+        Self(now.map_or(Duration::ZERO, |time| time.as_duration()))
+    }
+
+    #[cfg(not(feature = "cli"))]
+    pub fn now() -> Self {
+        Self(Duration::ZERO)
     }
 
     /// Seconds since then.

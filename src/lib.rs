@@ -16,30 +16,94 @@
 //!                              film::composite ──> stages: antialiasing, noise, or cartoon ──> output: PNG, EXR
 //! ```
 //!
-//! [`renderer::Renderer`] drives all of it: built once from a scene, advanced by a budget, asked for its film at any moment.
+//! [`Renderer`] drives all of it: built once from a scene, advanced by a budget, asked for its film at any moment.
 //! A backend knows no file format, and nothing below `cli` prints.
+//!
+//! What is meant for users of the library is named below; the modules are public for the program, the tests and the benchmarks alone,
+//! and may change. Features, all on by default: `cli`, the program; `bench`, its `mixray bench`. Without them the library is lean.
+//!
+//! ```no_run
+//! use mixray::{Budget, PngBits, Renderer, RendererOptions, Target, Watcher, load, write_png};
+//!
+//! let scene = load("scene.toml".as_ref())?;
+//! let mut renderer = Renderer::new(scene, RendererOptions::default(), &Watcher::none())?;
+//! renderer.advance(Budget::Complete, &Watcher::none())?;
+//! let photo = renderer.scene().photo.as_ref();
+//! let target = Target::picture("picture.png".as_ref())?;
+//! write_png(&target, &renderer.picture(), photo, PngBits::for_photo(photo))?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+#[doc(hidden)]
 pub mod accel;
+#[cfg(feature = "bench")]
+#[doc(hidden)]
 pub mod bench;
+#[doc(hidden)]
 pub mod camera;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod cli;
 mod clock;
+#[doc(hidden)]
 pub mod cpu;
 mod decode;
+#[doc(hidden)]
+pub mod distortion;
+#[doc(hidden)]
 pub mod files;
+#[doc(hidden)]
 pub mod film;
+#[doc(hidden)]
 pub mod gpu;
+#[doc(hidden)]
 pub mod light;
+#[doc(hidden)]
 pub mod material;
+#[doc(hidden)]
 pub mod math;
+#[doc(hidden)]
 pub mod memory;
+#[doc(hidden)]
 pub mod output;
+#[doc(hidden)]
+pub mod pack;
+#[doc(hidden)]
 pub mod packed;
+#[doc(hidden)]
 pub mod renderer;
+#[doc(hidden)]
 pub mod scene;
+#[doc(hidden)]
 pub mod sequence;
+#[doc(hidden)]
 pub mod shared;
+#[doc(hidden)]
 pub mod stages;
-
+#[doc(hidden)]
 pub mod video;
+#[doc(hidden)]
 pub mod work;
+
+#[doc(inline)]
+pub use film::{Film, MergeError, Picture, Planes, composite};
+#[doc(inline)]
+pub use gpu::GpuError;
+#[doc(inline)]
+pub use output::{Format, Metadata, OutputError, PngBits, Target, write_exr, write_png};
+#[doc(inline)]
+pub use renderer::{
+    Budget, CameraNoise, ErrorGoal, FrameEdit, RenderError, Renderer, RendererOptions, Skip, Stats,
+    Without,
+};
+#[doc(inline)]
+pub use scene::{
+    BackendChoice, Camera, Composite, Estimator, Given, Lens, Photo, SamplerKind, Scene,
+    SceneError, Settings, load, load_with,
+};
+#[doc(inline)]
+pub use sequence::{RenderedSequence, SequenceError, SequenceOptions, render_sequence};
+#[doc(inline)]
+pub use stages::{Finished, GpuStages, finish};
+#[doc(inline)]
+pub use work::{Phase, Progress, Watcher};

@@ -111,6 +111,7 @@ impl Module {
 
     /// The declarations in WGSL.
     pub fn wgsl(&self) -> String {
+        let here = format!("package::{}::", self.path());
         let mut text = String::new();
         for constant in self.constants {
             let (kind, literal) = (constant.value)().wgsl();
@@ -119,7 +120,9 @@ impl Module {
         for record in self.records {
             let _ = writeln!(text, "struct {} {{", record.name);
             for field in record.fields {
-                let _ = writeln!(text, "    {}: {},", field.name, (field.wgsl)());
+                // A record of this very module by its bare name: WESL strips what is named by the path of the module it stands in.
+                let kind = (field.wgsl)().replace(&here, "");
+                let _ = writeln!(text, "    {}: {kind},", field.name);
             }
             text.push_str("}\n");
         }
@@ -301,4 +304,7 @@ pub(crate) use shared;
 shared! {
     /// Index that stands for "none" in every u32 reference.
     pub const NONE: u32 = u32::MAX;
+
+    /// Threads of a workgroup.
+    pub const WORKGROUP: u32 = 64;
 }

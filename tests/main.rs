@@ -1,5 +1,6 @@
 //! The integration tests, all in one binary: `cargo test --release --test integration -- stages::` runs one folder's.
 
+mod architecture;
 mod backends;
 mod bench;
 mod cli;

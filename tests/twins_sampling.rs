@@ -2,11 +2,12 @@
 
 use bytemuck::Zeroable;
 use glam::{DMat4, DVec3, Vec3};
-use mixray::camera::lens::{camera_project, camera_ray, frame_camera, sample_lens};
+use mixray::camera::lens::{camera_project, camera_ray, sample_lens};
 use mixray::camera::sampler::{MAX_TOTAL, SampleKey, sample_4d};
 use mixray::gpu::harness::{Probe, test_device};
 use mixray::gpu::{Features, SceneBuffers, SceneParts};
 use mixray::math::*;
+use mixray::pack::camera::frame_camera;
 use mixray::packed::Frame;
 use mixray::scene::{Aperture, Camera, Lens};
 

@@ -4,7 +4,7 @@
 // The tree is the compressed wide BVH of Ylitie, Karras and Laine (HPG 2017), made in src/accel/compressed.rs.
 
 import package::gpu::buffers::{bvh_leaves, bvh_nodes, frame};
-import package::shared::NONE;
+import package::shared::{NONE, WORKGROUP};
 
 // A hit counts if t > t_min, or t == t_min and its id is larger than skip, and if t < t_max.
 struct Ray {
@@ -15,16 +15,7 @@ struct Ray {
     skip: u32,
 }
 
-const WORKGROUP_THREADS: u32 = 64u;
-// Levels of a tree, MAX_LEVELS in src/accel/compressed.rs: each leaves at most one group of children waiting.
-const TRACE_STACK: u32 = 24u;
-var<workgroup> trace_stack: array<vec2<u32>, 1536>;
-
-// 16 units of rounding.
-const BOX_SLACK: f32 = 9.5367431640625e-7;
-const PROJECTED_SLACK: f32 = 4.76837158203125e-7;
-// 2^-80: its inverse times any distance is finite. A flat box is wider than what such a component moves a ray.
-const LEAST_COMPONENT: f32 = 8.271806125530277e-25;
+var<workgroup> trace_stack: array<vec2<u32>, TRACE_STACK * WORKGROUP>;
 
 fn is_finite3(v: vec3<f32>) -> bool {
     return all((bitcast<vec3<u32>>(v) & vec3<u32>(0x7f800000u)) != vec3<u32>(0x7f800000u));
@@ -113,7 +104,7 @@ fn trace(ray: Ray, world: u32, any_hit: bool, thread: u32) -> Hit {
             let node = 5u * (node_base + group.x + before);
             group.y &= ~(1u << bit);
             if group.y > 0x00ffffffu && depth < TRACE_STACK {
-                trace_stack[depth * WORKGROUP_THREADS + thread] = group;
+                trace_stack[depth * WORKGROUP + thread] = group;
                 depth += 1u;
             }
 
@@ -194,7 +185,7 @@ fn trace(ray: Ray, world: u32, any_hit: bool, thread: u32) -> Hit {
                 break;
             }
             depth -= 1u;
-            group = trace_stack[depth * WORKGROUP_THREADS + thread];
+            group = trace_stack[depth * WORKGROUP + thread];
         }
     }
     return hit;

@@ -4,7 +4,7 @@ import package::gpu::buffers::frame;
 import package::packed::records::{APERTURE_DISC, APERTURE_SQUARE};
 import package::math::{INV_TAU, dot3, normalize3, sincos_2pi};
 import package::camera::shutter::{CameraPose, camera_pose};
-
+import package::distortion::UNDISTORT_STEPS;
 
 struct CameraRay {
     origin: vec3<f32>,

@@ -29,63 +29,63 @@ fn sample_set(key: SampleKey, set_id: u32) -> SampleSet {
     return SampleSet(key, stream, reverseBits(shuffled), vec4<u32>(0u, 1u, 2u, 3u));
 }
 
-fn pair(set: SampleSet) -> vec2<f32> {
+fn pair(numbers: SampleSet) -> vec2<f32> {
     var bits: vec2<u32>;
-    if is_grid(set) {
-        bits = grid_pair(set, 0u);
+    if is_grid(numbers) {
+        bits = grid_pair(numbers, 0u);
     } else {
-        bits = vec2<u32>(sobol(set, 0u), sobol(set, 1u));
+        bits = vec2<u32>(sobol(numbers, 0u), sobol(numbers, 1u));
     }
     return vec2<f32>(uniform_from_bits(bits.x), uniform_from_bits(bits.y));
 }
 
-fn second_pair(set: SampleSet) -> vec2<f32> {
+fn second_pair(numbers: SampleSet) -> vec2<f32> {
     var bits: vec2<u32>;
-    if is_grid(set) {
-        bits = grid_pair(set, 1u);
+    if is_grid(numbers) {
+        bits = grid_pair(numbers, 1u);
     } else {
-        bits = vec2<u32>(sobol(set, 2u), sobol(set, 3u));
+        bits = vec2<u32>(sobol(numbers, 2u), sobol(numbers, 3u));
     }
     return vec2<f32>(uniform_from_bits(bits.x), uniform_from_bits(bits.y));
 }
 
-fn third(set: SampleSet) -> f32 {
-    if is_grid(set) {
-        return uniform_from_bits(grid_pair(set, 1u).x);
+fn third(numbers: SampleSet) -> f32 {
+    if is_grid(numbers) {
+        return uniform_from_bits(grid_pair(numbers, 1u).x);
     }
-    return uniform_from_bits(sobol(set, 2u));
+    return uniform_from_bits(sobol(numbers, 2u));
 }
 
-fn fourth(set: SampleSet) -> f32 {
-    if is_grid(set) {
-        return uniform_from_bits(grid_pair(set, 1u).y);
+fn fourth(numbers: SampleSet) -> f32 {
+    if is_grid(numbers) {
+        return uniform_from_bits(grid_pair(numbers, 1u).y);
     }
-    return uniform_from_bits(sobol(set, 3u));
+    return uniform_from_bits(sobol(numbers, 3u));
 }
 
-fn is_grid(set: SampleSet) -> bool {
-    return set.key.sampler == SAMPLER_JITTERED || set.key.sampler == SAMPLER_CMJ;
+fn is_grid(numbers: SampleSet) -> bool {
+    return numbers.key.sampler == SAMPLER_JITTERED || numbers.key.sampler == SAMPLER_CMJ;
 }
 
-fn grid_pair(set: SampleSet, pair: u32) -> vec2<u32> {
-    let samples = clamp(set.key.total, 1u, MAX_TOTAL);
+fn grid_pair(numbers: SampleSet, pair: u32) -> vec2<u32> {
+    let samples = clamp(numbers.key.total, 1u, MAX_TOTAL);
     let columns = strata_columns(samples);
-    let grid = Grid(columns, (samples + columns - 1u) / columns, set.key.sampler == SAMPLER_CMJ);
-    let jitter = hash_combine(set.stream, set.key.index);
+    let grid = Grid(columns, (samples + columns - 1u) / columns, numbers.key.sampler == SAMPLER_CMJ);
+    let jitter = hash_combine(numbers.stream, numbers.key.index);
     if pair == 0u {
-        return grid_point(grid, set.stream ^ 0x2c1b3c6du, set.key.index, jitter);
+        return grid_point(grid, numbers.stream ^ 0x2c1b3c6du, numbers.key.index, jitter);
     }
-    return grid_point(grid, set.stream ^ 0x297a2d39u, set.key.index, hash_u32(jitter ^ 0x6b43a9b5u));
+    return grid_point(grid, numbers.stream ^ 0x297a2d39u, numbers.key.index, hash_u32(jitter ^ 0x6b43a9b5u));
 }
 
-fn sobol(set: SampleSet, number: u32) -> u32 {
-    let seed = hash_u32(set.stream ^ SOBOL_SEEDS[number]);
-    return reverseBits(owen_scramble(sobol_reversed(set.point, set.order[number]), seed));
+fn sobol(numbers: SampleSet, number: u32) -> u32 {
+    let seed = hash_u32(numbers.stream ^ SOBOL_SEEDS[number]);
+    return reverseBits(owen_scramble(sobol_reversed(numbers.point, numbers.order[number]), seed));
 }
 
 fn sample_4d(key: SampleKey, set_id: u32) -> vec4<f32> {
-    let set = sample_set(key, set_id);
-    return vec4<f32>(pair(set), second_pair(set));
+    let numbers = sample_set(key, set_id);
+    return vec4<f32>(pair(numbers), second_pair(numbers));
 }
 
 fn strata_columns(total: u32) -> u32 {

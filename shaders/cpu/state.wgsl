@@ -3,9 +3,6 @@
 import package::shared::NONE;
 import package::accel::trace::Hit;
 
-// WGSL has no literal for infinity: the largest float stands for it, and misses carry it.
-const FAR: f32 = 3.40282346638528859812e38;
-
 struct RayCounts {
     primary: u32,
     mixed: u32,

@@ -2,11 +2,12 @@
 // invocation runs long and the lanes that are done make room.
 
 import package::gpu::buffers::frame;
+import package::shared::WORKGROUP;
 import package::cpu::estimator::{advance, begin_sample};
 import package::film::sums::{guide_add, pixel_add, pixel_add_real};
 import package::gpu::lanes::{
     add_rays, append, batch, counters, guide_sums, indirect, pixel_sums, queue_in, work,
-    COUNT_IN, COUNT_OUT, COUNT_STEPS, WORKGROUP,
+    COUNT_IN, COUNT_OUT, COUNT_STEPS,
 };
 import package::cpu::request::answer;
 import package::cpu::state::{
@@ -14,7 +15,7 @@ import package::cpu::state::{
     path_results, paths,
 };
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn kernel_generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     let lane = id.x;
     var alive = false;
@@ -54,7 +55,7 @@ fn kernel_turn() {
     indirect[2] = 1u;
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn kernel_trace(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     var st: PathState;
     if id.x < atomicLoad(&counters[COUNT_IN]) {
@@ -71,7 +72,7 @@ fn kernel_trace(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_inv
     add_rays(st.rays, thread);
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn kernel_advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     var st: PathState;
     var alive = false;
@@ -92,7 +93,7 @@ fn kernel_advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_i
 }
 
 // One thread sums all samples of one pixel, in their order.
-@compute @workgroup_size(64)
+@compute @workgroup_size(WORKGROUP)
 fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>) {
     let slot = id.x;
     if slot < batch.pixel_count {

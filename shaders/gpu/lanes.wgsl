@@ -3,37 +3,12 @@
 import package::cpu::state::RayCounts;
 import package::film::sums::{PixelSums, GuideSums};
 
-// Uniform of a batch; src/gpu/lanes.rs has its twin.
-struct Batch {
-    // Lane l is sample l / pixel_count of the pixel in slot l % pixel_count.
-    pixel_count: u32,
-    lane_count: u32,
-    // Samples of each pixel that earlier batches of the same pixels have taken.
-    sample_offset: u32,
-    sample_count: u32,
-    // 1: the real radiance alone.
-    real_pass: u32,
-    with_guides: u32,
-    // 0, unknown to the compiler.
-    zero: u32,
-    pad: u32,
-}
-
-const WORKGROUP: u32 = 64u;
-
-// Places in `counters`: lanes in the queue being read, in the queue being written, lane steps since the batch began, then rays by kind.
-const COUNT_IN: u32 = 0u;
-const COUNT_OUT: u32 = 1u;
-const COUNT_STEPS: u32 = 2u;
-const COUNT_RAYS: u32 = 3u;
-const RAY_KINDS: u32 = 5u;
-
 @group(1) @binding(0) var<uniform> batch: Batch;
 // Pixel, first sample, end of the samples, by slot.
 @group(1) @binding(1) var<storage, read> work: array<vec4<u32>>;
 @group(1) @binding(2) var<storage, read> queue_in: array<u32>;
 @group(1) @binding(3) var<storage, read_write> queue_out: array<u32>;
-@group(1) @binding(4) var<storage, read_write> counters: array<atomic<u32>, 8>;
+@group(1) @binding(4) var<storage, read_write> counters: array<atomic<u32>, COUNTERS>;
 @group(1) @binding(5) var<storage, read_write> indirect: array<u32, 3>;
 // By slot.
 @group(1) @binding(6) var<storage, read_write> pixel_sums: array<PixelSums>;
@@ -62,7 +37,7 @@ fn append(lane: u32, alive: bool, thread: u32) {
     }
 }
 
-var<workgroup> counted: array<atomic<u32>, 5>;
+var<workgroup> counted: array<atomic<u32>, RAY_KINDS>;
 
 // Counts rays that this thread has traced. All threads of the workgroup call it.
 fn add_rays(rays: RayCounts, thread: u32) {

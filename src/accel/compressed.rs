@@ -11,8 +11,8 @@ use obvhs::{
     cwbvh::{bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode},
 };
 
-/// Levels that the shader's stack serves, `TRACE_STACK` there.
-const MAX_LEVELS: usize = 24;
+/// Levels that the shader's stack serves.
+pub(super) const MAX_LEVELS: usize = 24;
 
 const MAX_LEAF_TRIANGLES: u32 = 3;
 

@@ -6,7 +6,7 @@ use super::{Hit, Ray, WorldBvh};
 use crate::bench::stress::backend::traced_by_shader;
 use crate::bench::stress::meshes::*;
 use crate::gpu::harness::test_device;
-use crate::packed::NONE;
+use crate::shared::NONE;
 
 /// Hits in (real, virtual) worlds as the shader finds them; `None` without a device.
 fn shader_hits(worlds: [&WorldBvh; 2], rays: &[(Ray, u32)], any_hit: bool) -> Option<Vec<Hit>> {

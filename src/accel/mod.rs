@@ -17,15 +17,16 @@
 mod avx2;
 mod binary;
 mod compressed;
+mod kernel;
 mod large_pages;
 mod spheres;
 mod stack;
 pub(crate) mod trace;
 mod wide;
 
-#[cfg(test)]
+#[cfg(all(test, feature = "bench"))]
 mod gpu_tests;
-#[cfg(test)]
+#[cfg(all(test, feature = "bench"))]
 mod tests;
 
 use std::sync::{Mutex, OnceLock};
@@ -34,10 +35,10 @@ use glam::Vec3;
 use obvhs::bvh2::Bvh2;
 use thiserror::Error;
 
-use crate::packed::NONE;
+use crate::shared::NONE;
 use compressed::CompressedBvh;
+use kernel::Kernel;
 pub use trace::Hit;
-use trace::Kernel;
 use wide::WideBvh;
 
 /// Largest absolute coordinate, metres, for which no product in the triangle test overflows.
@@ -178,12 +179,12 @@ impl WorldBvh {
 
     #[inline]
     fn closest_by(&self, kernel: Kernel, ray: &Ray) -> Hit {
-        trace::closest(&self.wide, kernel, ray)
+        kernel::closest(&self.wide, kernel, ray)
     }
 
     #[inline]
     fn any_by(&self, kernel: Kernel, ray: &Ray) -> bool {
-        trace::any(&self.wide, kernel, ray)
+        kernel::any(&self.wide, kernel, ray)
     }
 
     /// Smallest and largest vertex coordinates; `None` without triangles.

@@ -1,6 +1,6 @@
 use glam::Vec3;
 
-use super::trace::Kernel;
+use super::kernel::Kernel;
 use super::*;
 use crate::bench::stress::brute_force::*;
 use crate::bench::stress::meshes::*;

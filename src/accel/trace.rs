@@ -5,6 +5,15 @@ use super::wide::{Eight, TriangleBlock, WideBvh, WideNode};
 use crate::shared::shared;
 
 shared! {
+    /// Slack of the projected bounds test, relative to the largest projected coordinate: four units of rounding, doubled.
+    pub(super) const PROJECTED_SLACK: f32 = 1.0 / (1 << 21) as f32;
+    /// Slack of the GPU's box test: 16 units of rounding.
+    const BOX_SLACK: f32 = 1.0 / (1 << 20) as f32;
+    /// 2^-80: its inverse times any distance is finite. A flat box is wider than what such a component moves a ray.
+    const LEAST_COMPONENT: f32 = f32::from_bits((127 - 80) << 23);
+    /// Levels of a tree on the GPU: each leaves at most one group of children waiting.
+    const TRACE_STACK: u32 = super::compressed::MAX_LEVELS as u32;
+
     /// Where a ray met a triangle: `(1 - u - v) * v0 + u * v1 + v * v2`.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Hit {
@@ -19,46 +28,6 @@ shared! {
 
 /// Factor by which a box may be farther than a hit: 16 units of rounding (see the module's proof).
 pub(super) const BOX_MARGIN: f32 = 1.0 + 1.0 / (1 << 20) as f32;
-
-/// Slack of the projected bounds test, relative to the largest projected coordinate: four units of rounding, doubled.
-pub(super) const PROJECTED_SLACK: f32 = 1.0 / (1 << 21) as f32;
-
-/// Which instructions the traversal uses; the results are the same.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Kernel {
-    Portable,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-impl Kernel {
-    /// All there are, the slowest first.
-    const ALL: &[Kernel] = &[
-        Kernel::Portable,
-        #[cfg(target_arch = "x86_64")]
-        Kernel::Avx2,
-        #[cfg(target_arch = "x86_64")]
-        Kernel::Avx512,
-    ];
-
-    /// Those that this processor can run, the slowest first.
-    pub(super) fn supported() -> impl DoubleEndedIterator<Item = Kernel> {
-        Kernel::ALL.iter().copied().filter(|kernel| match kernel {
-            Kernel::Portable => true,
-            #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2 => super::avx2::has_avx2(),
-            #[cfg(target_arch = "x86_64")]
-            Kernel::Avx512 => super::avx2::has_avx512(),
-        })
-    }
-
-    /// The fastest that this processor can run.
-    pub(super) fn best() -> Kernel {
-        Kernel::supported().next_back().unwrap_or(Kernel::Portable)
-    }
-}
 
 /// What the portable traversal needs to know of a ray.
 struct RayFrame {
@@ -253,34 +222,10 @@ macro_rules! traversal {
 }
 pub(super) use traversal;
 
+/// Nearest or any accepted hit, without special instructions.
 #[inline(always)]
-fn traverse<const ANY: bool>(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> Found {
-    match kernel {
-        Kernel::Portable => portable::<ANY>(tree, ray),
-        #[cfg(target_arch = "x86_64")]
-        Kernel::Avx2 => super::avx2::traverse::<ANY>(tree, ray),
-        #[cfg(target_arch = "x86_64")]
-        Kernel::Avx512 => super::avx2::traverse_avx512::<ANY>(tree, ray),
-    }
-}
-
-#[inline(always)]
-pub(super) fn closest(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> Hit {
-    let found = traverse::<false>(tree, kernel, ray);
-    if !found.any {
-        return Hit::MISS;
-    }
-    Hit {
-        t: found.t,
-        u: found.weights[0],
-        v: found.weights[1],
-        triangle: found.id,
-    }
-}
-
-#[inline(always)]
-pub(super) fn any(tree: &WideBvh, kernel: Kernel, ray: &Ray) -> bool {
-    traverse::<true>(tree, kernel, ray).any
+pub(super) fn traverse<const ANY: bool>(tree: &WideBvh, ray: &Ray) -> Found {
+    portable::<ANY>(tree, ray)
 }
 
 /// One triangle seen along the ray.

@@ -175,8 +175,8 @@ mod tests {
         if crate::gpu::harness::test_device().is_none() {
             return;
         }
-        let mut scene = crate::packed::test_scene();
-        scene.objects.push(crate::packed::test_mesh(
+        let mut scene = crate::pack::test_scene();
+        scene.objects.push(crate::pack::test_mesh(
             crate::scene::Side::Virtual,
             &[[-1.0, -1.0, -2.0], [1.0, -1.0, -2.0], [0.0, 1.0, -2.0]],
             &[[0, 1, 2]],

@@ -6,7 +6,7 @@ use crate::clock::ProcessorTime;
 
 use super::{Errors, Method, Row, Run, Truth};
 use crate::film::Picture;
-use crate::packed::PackError;
+use crate::pack::PackError;
 use crate::renderer::{Budget, RayCounts, RenderError, Renderer, RendererOptions, Watcher};
 use crate::scene::{BackendChoice, Scene};
 

@@ -3,7 +3,7 @@
 //! The way is cut into equal pieces of time; within one the position moves along a straight line and the orientation's quaternion too, made
 //! a unit again.
 
-use glam::{DMat4, DQuat, DVec3, Vec3};
+use glam::Vec3;
 
 use super::sampler::{SampleKey, sample_4d};
 use crate::packed::{FRAME_SHUTTER_ORDERED, Frame, SHUTTER_POSES};
@@ -75,29 +75,4 @@ pub fn camera_pose_at(frame: &Frame, share: f32) -> CameraPose {
             1.0 - 2.0 * (x * x + y * y),
         ),
     }
-}
-
-/// Fills the frame's poses from those at equal steps of the shutter's time; false, and nothing changes, if they are all one.
-pub fn frame_poses(
-    world_from_camera: &[DMat4; SHUTTER_POSES],
-    anchor: DVec3,
-    frame: &mut Frame,
-) -> bool {
-    let first = world_from_camera[0];
-    if world_from_camera.iter().all(|pose| *pose == first) {
-        return false;
-    }
-    let mut before = DQuat::from_mat4(&first);
-    for (i, pose) in world_from_camera.iter().enumerate() {
-        let mut turned = DQuat::from_mat4(pose);
-        // Of the two quaternions of a rotation, the one nearer to the last, so that what lies between is short.
-        if turned.dot(before) < 0.0 {
-            turned = -turned;
-        }
-        before = turned;
-        let position = pose.w_axis.truncate() - anchor;
-        frame.shutter_poses[2 * i] = position.as_vec3().extend(0.0).to_array();
-        frame.shutter_poses[2 * i + 1] = turned.as_quat().to_array();
-    }
-    true
 }

@@ -170,7 +170,8 @@ mod tests {
     use std::sync::atomic::{AtomicU32, Ordering};
 
     use super::*;
-    use crate::packed::{PixelInfo, test_mesh, test_scene};
+    use crate::pack::{test_mesh, test_scene};
+    use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
     use crate::scene::{Environment, EnvironmentMap, Material, Side};
 
     /// A square before half of a bright sky, six tiles.
@@ -198,8 +199,7 @@ mod tests {
             scale: 1.0,
         });
         let mut packed = PackedScene::build(&scene).expect("packs");
-        packed.pixels =
-            vec![PixelInfo::uniform(crate::packed::PIXEL_BEAM_MAY_MEET_VIRTUAL); 64 * 48];
+        packed.pixels = vec![PixelInfo::uniform(PIXEL_BEAM_MAY_MEET_VIRTUAL); 64 * 48];
         packed
     }
 

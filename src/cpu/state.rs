@@ -77,6 +77,9 @@ shared! {
     /// Density that stands for a delta distribution: no other technique can find its directions.
     pub const DELTA_DENSITY: f32 = -1.0;
 
+    /// The shaders' infinity, for which WGSL has no literal; misses carry it.
+    const FAR: f32 = f32::MAX;
+
     /// A virtual hit counts as nearer within this relative distance, so that a base lying in the table's plane covers the table.
     pub const COINCIDENCE: f32 = 1e-5;
 

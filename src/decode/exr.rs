@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 use std::io::Cursor;
+use std::path::Path;
 
 use ::exr::block::UncompressedBlock;
 use ::exr::block::chunk::Chunk;
@@ -12,6 +13,7 @@ use ::exr::prelude::{FlatSamples, Vec2, f16};
 use rayon::prelude::*;
 
 use super::channels::ChannelFile;
+use super::file::{MAX_PICTURE_BYTES, read_file};
 use super::{ImageFile, Pixels, broken, check_size, ensure_memory, guarded};
 
 /// Most channels of a part.
@@ -19,8 +21,33 @@ const MAX_CHANNELS: usize = 1024;
 /// A block takes at least its place in the table, its own place and its length.
 const LEAST_BLOCK_BYTES: usize = 16;
 
+impl ChannelFile {
+    /// # Errors
+    /// Why it cannot be read, in one line that begins with the path.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let read = || {
+            let bytes = read_file(path, MAX_PICTURE_BYTES).map_err(|reason| {
+                format!("it cannot be read ({reason}); expected an .exr file; correct the path or the rights")
+            })?;
+            Self::decode(&bytes)
+        };
+        read().map_err(|problem| format!("{}: {problem}", path.display()))
+    }
+
+    /// Decodes the bytes of an OpenEXR file.
+    ///
+    /// # Errors
+    /// Why they cannot be used, in one line.
+    pub fn decode(bytes: &[u8]) -> Result<Self, String> {
+        if !bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+            return Err("it is no OpenEXR file; expected .exr; convert it".to_owned());
+        }
+        guarded(|| read_channels(bytes)).unwrap_or_else(|thrown| Err(broken(thrown)))
+    }
+}
+
 /// The channels of a file's first part.
-pub(super) fn read_channels(bytes: &[u8]) -> Result<ChannelFile, String> {
+fn read_channels(bytes: &[u8]) -> Result<ChannelFile, String> {
     let headers = read_headers(bytes)?;
     let header = headers.first().ok_or_else(|| broken("it has no part"))?;
     let (width, height) = size_of(header)?;

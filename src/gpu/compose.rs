@@ -9,7 +9,7 @@ use wesl::{CompileOptions, Feature, Mangler, ModulePath, VirtualResolver, Wesl};
 use super::GpuError;
 use crate::packed::{self, PackedScene};
 use crate::shared::{self, Module};
-use crate::{accel, camera, cpu, film, light, material, math};
+use crate::{accel, camera, cpu, distortion, film, light, material, math};
 
 /// The embedded modules, one a file of `shaders/`: name and source.
 pub const MODULES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/shader_modules.rs"));
@@ -141,8 +141,8 @@ pub(super) const DECLARED: &[&Module] = &[
     &shared::SHARED,
     &math::SHARED,
     &packed::records::SHARED,
+    &distortion::SHARED,
     &accel::trace::SHARED,
-    &camera::lens::SHARED,
     &camera::sampler::SHARED,
     &camera::shutter::SHARED,
     &light::cones::SHARED,
@@ -153,6 +153,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &material::surface::SHARED,
     &material::texture::SHARED,
     &film::sums::SHARED,
+    &super::lanes::SHARED,
     &cpu::contribution::SHARED,
     &cpu::estimator::SHARED,
     &cpu::request::SHARED,

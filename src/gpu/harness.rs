@@ -21,9 +21,7 @@
 use std::sync::{Arc, OnceLock};
 
 use super::{AdapterChoice, Composer, Features, GpuDevice, GpuError, SceneBuffers, kernel::Kernel};
-
-/// Threads in a workgroup.
-const WORKGROUP: usize = 64;
+use crate::shared::WORKGROUP;
 
 /// The device that tests share, software or not; None, said aloud, where there is none.
 ///
@@ -107,7 +105,7 @@ impl Probe<'_> {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());
         kernel.set(&mut pass, &groups);
-        pass.dispatch_workgroups(records.div_ceil(WORKGROUP) as u32, 1, 1);
+        pass.dispatch_workgroups((records as u32).div_ceil(WORKGROUP), 1, 1);
         drop(pass);
         encoder.copy_buffer_to_buffer(&output, 0, &staging, 0, output.size());
         gpu.submit_and_wait(encoder)?;

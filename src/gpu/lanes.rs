@@ -2,27 +2,45 @@
 //! bind group 2, as `shaders/cpu/state.wgsl` does.
 
 use std::collections::BTreeMap;
+use std::mem::offset_of;
 
 use bytemuck::{AnyBitPattern, Pod, Zeroable};
 
 use super::kernel::Kernel;
 use super::{GpuDevice, GpuError};
 use crate::film::{GuideSums, PixelSums};
+use crate::shared::{WORKGROUP, shared};
 use crate::work::{PixelWork, RayCounts};
 
-/// Twin of the shader's `Batch`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct Batch {
-    pub pixel_count: u32,
-    pub lane_count: u32,
-    pub sample_offset: u32,
-    pub sample_count: u32,
-    pub real_pass: u32,
-    pub with_guides: u32,
-    /// Stays 0; the shader hides intermediate sums from the compiler with it.
-    pub zero: u32,
-    pub pad: u32,
+shared! {
+    /// Uniform of a batch.
+    #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+    pub struct Batch {
+        /// Lane l is sample l / pixel_count of the pixel in slot l % pixel_count.
+        pub pixel_count: u32,
+        pub lane_count: u32,
+        /// Samples of each pixel that earlier batches of the same pixels have taken.
+        pub sample_offset: u32,
+        pub sample_count: u32,
+        /// 1: the real radiance alone.
+        pub real_pass: u32,
+        pub with_guides: u32,
+        /// Stays 0; the shader hides intermediate sums from the compiler with it.
+        pub zero: u32,
+        pub pad: u32,
+    }
+
+    /// Places in the shader's `counters`, which are words: of [`Counters::lanes_in`] and so on.
+    const COUNT_IN: u32 = word(offset_of!(Counters, lanes_in));
+    const COUNT_OUT: u32 = word(offset_of!(Counters, lanes_out));
+    const COUNT_STEPS: u32 = word(offset_of!(Counters, steps));
+    const COUNT_RAYS: u32 = word(offset_of!(Counters, rays));
+    const COUNTERS: u32 = word(size_of::<Counters>());
+    const RAY_KINDS: u32 = word(size_of::<RayCounts<u32>>());
+}
+
+const fn word(bytes: usize) -> u32 {
+    bytes as u32 / 4
 }
 
 /// What the device counts while a batch runs.
@@ -78,7 +96,8 @@ pub fn most_lanes(gpu: &GpuDevice, state_bytes: u64) -> usize {
         .max_storage_buffer_binding_size
         .min(gpu.limits.max_buffer_size)
         / largest;
-    let dispatchable = u64::from(gpu.limits.max_compute_workgroups_per_dimension) * 64;
+    let dispatchable =
+        u64::from(gpu.limits.max_compute_workgroups_per_dimension) * u64::from(WORKGROUP);
     bindable.min(dispatchable) as usize
 }
 

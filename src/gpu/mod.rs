@@ -56,6 +56,8 @@ pub(crate) mod layout_test;
 #[cfg(test)]
 mod traffic_test;
 #[cfg(test)]
+mod twins_test;
+#[cfg(test)]
 mod variants_test;
 #[cfg(test)]
 mod wavefront_test;

@@ -38,7 +38,7 @@ pub struct MaterialTable {
 
 impl MaterialTable {
     /// The packed index of a material, packing it if it is new.
-    pub(super) fn index_of(
+    pub(crate) fn index_of(
         &mut self,
         packed: &mut PackedScene,
         material: &Arc<scene::Material>,

@@ -3,22 +3,10 @@
 //! The records are declared for both sides at once ([`records`], [`crate::shared`]).
 //! Triangle ids are global: real triangles come first (`0..Frame::real_triangle_count`), virtual ones after.
 
-mod build;
-mod lights;
-mod materials;
+pub(crate) mod materials;
 pub(crate) mod records;
-mod shutter;
-#[cfg(test)]
-mod test_support;
-#[cfg(test)]
-mod tests;
 
-pub use build::{PackError, next_anchor};
-pub(crate) use lights::FEW_LIGHTS;
 pub use records::*;
-pub use shutter::{Instant, instants, row_ends, traced_shutter};
-#[cfg(test)]
-pub use test_support::{test_mesh, test_scene};
 
 use crate::accel::WorldBvh;
 pub use crate::shared::NONE;
@@ -51,9 +39,9 @@ pub struct PackedScene {
     pub pixels: Vec<PixelInfo>,
     /// What bounds moving objects over the whole time of the shutter; empty where nothing moves: then the frame's spheres do.
     pub swept_spheres: Vec<[f32; 4]>,
-    material_table: materials::MaterialTable,
-    real_vertex_count: usize,
-    env_mean_luminance: f64,
+    pub(crate) material_table: materials::MaterialTable,
+    pub(crate) real_vertex_count: usize,
+    pub(crate) env_mean_luminance: f64,
 }
 
 #[cfg(test)]

@@ -10,7 +10,8 @@ use super::{RenderError, RendererOptions, Seconds, Skip};
 use crate::cpu;
 use crate::film::Film;
 use crate::gpu::GpuError;
-use crate::packed::{PIXEL_OUT_OF_REACH, PackError, PackedScene, PixelInfo};
+use crate::pack::PackError;
+use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
 use crate::scene::{Composite, Scene};
 use crate::work::{Meter, Phase, Progress, RayCounts, Watcher, WorkList};
 

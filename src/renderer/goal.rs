@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use super::{Skip, Without};
 use crate::scene::{NoiseFit, srgb};
 
 /// Noise of a camera: variance of each channel's 8-bit code value (0..255, sRGB-encoded) as a straight line over it.
@@ -36,16 +35,6 @@ pub struct ErrorGoal {
 impl ErrorGoal {
     /// Rays per pixel after which a pixel is left as it is, unless the caller says otherwise.
     pub const DEFAULT_MAX_RAYS_PER_PIXEL: u32 = 1 << 14;
-
-    /// What is left to aim at without these savings.
-    #[must_use]
-    pub fn without(self, without: Without) -> Self {
-        let stops_at_noise = !without.contains(Skip::CameraNoise);
-        Self {
-            noise: self.noise.filter(|_| stops_at_noise),
-            ..self
-        }
-    }
 
     /// There is nothing to aim at: all rays are taken.
     pub fn takes_all_rays(&self) -> bool {

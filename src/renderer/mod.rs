@@ -34,7 +34,6 @@ mod needs;
 mod photo_albedo;
 mod picture_motion;
 mod prepare;
-mod series;
 mod shown;
 mod skips;
 mod stats;
@@ -83,7 +82,7 @@ pub enum RenderError {
     #[error(transparent)]
     Memory(#[from] crate::memory::Shortage),
     #[error(transparent)]
-    Pack(#[from] crate::packed::PackError),
+    Pack(#[from] crate::pack::PackError),
     #[error(transparent)]
     Gpu(#[from] crate::gpu::GpuError),
     #[error(transparent)]
@@ -324,7 +323,7 @@ mod tests {
     use std::sync::Mutex;
 
     use super::*;
-    use crate::packed::{test_mesh, test_scene};
+    use crate::pack::{test_mesh, test_scene};
     use crate::scene::{
         BackendChoice, EncodedPhoto, Environment, EnvironmentMap, Light, LightKind, Material,
         Photo, Side,

@@ -6,7 +6,7 @@
 use super::RenderError;
 use super::core::{Core, Way};
 use crate::gpu::Changed;
-use crate::packed::{Instant, row_ends};
+use crate::pack::{Instant, row_ends};
 use crate::work::{Watcher, WorkList};
 
 pub(super) struct Moving {

@@ -305,7 +305,7 @@ fn median(albedos: &mut [[f32; 4]]) -> Option<[f32; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::packed::{test_mesh, test_scene};
+    use crate::pack::{test_mesh, test_scene};
     use crate::scene::{
         EncodedPhoto, Environment, EnvironmentMap, Light, LightKind, Material, Object, Scene, Side,
     };

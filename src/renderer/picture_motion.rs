@@ -5,8 +5,9 @@ use rayon::prelude::*;
 
 use super::Renderer;
 use crate::accel::Ray;
-use crate::camera::lens::{camera_ray, project};
+use crate::camera::lens::camera_ray;
 use crate::packed::{Frame, NONE};
+use crate::scene::projection::project;
 use crate::scene::{Camera, Object, Side};
 use crate::stages::{ObjectBlur, PictureMotion};
 

@@ -178,6 +178,18 @@ fn bit(skip: Skip) -> u16 {
     1 << skip as u8
 }
 
+impl ErrorGoal {
+    /// What is left to aim at without these savings.
+    #[must_use]
+    pub fn without(self, without: Without) -> Self {
+        let stops_at_noise = !without.contains(Skip::CameraNoise);
+        Self {
+            noise: self.noise.filter(|_| stops_at_noise),
+            ..self
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,10 +1,10 @@
 //! `[camera]` and `[lens]`.
 
-use crate::camera::lens::check_distortion;
 use crate::decode::{MAX_PIXELS, MAX_SIDE_PX};
 
 use super::error::Result;
 use super::pose::read_camera_pose;
+use super::projection::check_distortion;
 use super::reader::{Node, Table};
 use super::trajectory::Intrinsics;
 use super::{Aperture, Camera, Lens, Photo};

@@ -15,6 +15,7 @@ mod material;
 mod object;
 mod photo;
 mod pose;
+pub mod projection;
 pub(crate) mod reader;
 mod sandbox;
 mod scan;
@@ -27,6 +28,7 @@ pub mod srgb;
 mod tests;
 pub mod trajectory;
 
+// What a scene asks of the camera stages; each declares its own.
 pub use crate::stages::settings::*;
 pub use error::SceneError;
 pub use file::{Given, load, load_with};

@@ -9,9 +9,11 @@ use glam::DVec3;
 
 use super::plan::{Files, known_rate, views};
 use super::{Event, SequenceError, SequenceOptions};
-use crate::camera::lens::{camera_project, frame_camera, project};
+use crate::camera::lens::camera_project;
 use crate::decode::{MAX_TEXT_BYTES, read_text};
+use crate::pack::camera::frame_camera;
 use crate::packed::Frame;
+use crate::scene::projection::project;
 use crate::scene::trajectory::{EntryKey, FrameName, KnownPoint, Trajectory};
 use crate::scene::{Camera, Lens};
 use crate::video::FrameSource;

@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
 use super::report::{FrameCounts, SequenceSeconds, SequenceStats};
 use super::{Event, SequenceError, SequenceOptions};
-use crate::packed::next_anchor;
+use crate::pack::next_anchor;
 use crate::renderer::{
     Budget, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
 };

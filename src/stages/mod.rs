@@ -17,6 +17,7 @@ mod finish;
 pub mod motion_blur;
 pub mod noise;
 pub(crate) mod settings;
+mod table;
 #[cfg(test)]
 mod test_support;
 #[cfg(test)]

@@ -11,19 +11,8 @@ pub use super::noise::settings::{
 };
 
 use crate::scene::error::Result;
-use crate::scene::reader::{Node, Table};
-
-/// Settings of a stage, one table of a scene file.
-pub(crate) trait StageSettings: Sized {
-    /// Every key of the table.
-    const KEYS: &'static [&'static str];
-    /// The stage is never beside another one.
-    const ALONE: bool = false;
-
-    /// # Errors
-    /// A value that the stage cannot use.
-    fn read(table: &Table) -> Result<Self>;
-}
+use crate::scene::reader::Table;
+use crate::stages::table::StageSettings;
 
 macro_rules! stages {
     ($($(#[$doc:meta])* $name:ident: $settings:ty,)*) => {
@@ -64,17 +53,4 @@ stages! {
     noise: NoiseSettings,
     /// Never beside the others: it replaces what makes a picture look photographed.
     cartoon: CartoonSettings,
-}
-
-/// Replaces `value` if the key is there.
-pub(super) fn read_into<'a, T>(
-    table: &Table<'a>,
-    key: &str,
-    value: &mut T,
-    read: impl FnOnce(&Node<'a>) -> Result<T>,
-) -> Result<()> {
-    if let Some(given) = table.optional(key, read)? {
-        *value = given;
-    }
-    Ok(())
 }

@@ -11,7 +11,7 @@ pub use source::{FrameRange, FrameSource, Pixels, VideoFrame};
 pub use y4m::{Chroma, Header, Y4mReader};
 pub use yuv::{decode_yuv, encode_yuv};
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why frames cannot be read or written, in one line.
 #[derive(Debug, thiserror::Error)]
@@ -54,4 +54,20 @@ impl Place {
             },
         }
     }
+}
+
+fn cannot_write(error: &std::io::Error) -> String {
+    if error.kind() == std::io::ErrorKind::BrokenPipe {
+        return "it was closed before the last frame; expected a reader to the end; see why the program behind the pipe ended".to_owned();
+    }
+    format!(
+        "it cannot be written ({error}); expected room for the frames; make room, then go on with the same command"
+    )
+}
+
+/// Frames of another render are there.
+fn foreign(path: &Path) -> VideoError {
+    Place::File(path.into()).error(
+        "it holds frames of another render (another scene, trajectory or option, or none of this program's); expected a new place or the same render; name another, or replace them with --overwrite",
+    )
 }

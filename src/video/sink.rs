@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use super::y4m::Header;
 use super::y4m_file::{Paths, Y4mFile, write_frame};
 use super::yuv::encode_yuv;
-use super::{Pixels, Place, VideoError, VideoFrame};
+use super::{Pixels, Place, VideoError, VideoFrame, cannot_write, foreign};
 use crate::files::{self, final_target};
 use crate::film::Picture;
 use crate::output::{
@@ -175,15 +175,6 @@ impl FrameSink {
     }
 }
 
-pub(super) fn cannot_write(error: &std::io::Error) -> String {
-    if error.kind() == std::io::ErrorKind::BrokenPipe {
-        return "it was closed before the last frame; expected a reader to the end; see why the program behind the pipe ended".to_owned();
-    }
-    format!(
-        "it cannot be written ({error}); expected room for the frames; make room, then go on with the same command"
-    )
-}
-
 fn png_path(folder: &Path, name: &FrameName) -> PathBuf {
     let stem = match &name.file {
         Some(file) => Path::new(file)
@@ -194,13 +185,6 @@ fn png_path(folder: &Path, name: &FrameName) -> PathBuf {
         None => format!("frame_{:06}", name.number),
     };
     folder.join(format!("{stem}.png"))
-}
-
-/// Frames of another render are there.
-pub(super) fn foreign(path: &Path) -> VideoError {
-    Place::File(path.into()).error(
-        "it holds frames of another render (another scene, trajectory or option, or none of this program's); expected a new place or the same render; name another, or replace them with --overwrite",
-    )
 }
 
 /// The folder, links resolved.

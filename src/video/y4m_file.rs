@@ -4,8 +4,7 @@ use std::fs::{File, TryLockError};
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::sink::{cannot_write, foreign};
-use super::{Place, VideoError};
+use super::{Place, VideoError, cannot_write, foreign};
 use crate::files;
 use crate::output::{OutputError, sync_folder};
 

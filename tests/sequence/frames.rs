@@ -4,8 +4,8 @@ use std::io::Write;
 use std::process::Stdio;
 
 use glam::{DMat4, DVec3};
-use mixray::camera::lens::project;
 use mixray::renderer::{Budget, FrameEdit, Renderer, RendererOptions, Watcher};
+use mixray::scene::projection::project;
 use mixray::scene::trajectory::{CameraPath, FrameName, Trajectory, Views};
 
 use super::support::{BALL, sequence, y4m};

@@ -8,7 +8,7 @@ use super::scenes::{Step, ball, steps, triangle_counts};
 use super::{Curve, Law, Point};
 use crate::accel::WorldBvh;
 use crate::bench::measure::{MeasureError, Plan, Subject};
-use crate::packed::PackError;
+use crate::pack::PackError;
 
 /// A build is repeated until the runs took this long together, so that the clock's grain does not show.
 const LEAST_BUILD_SECS: f64 = 0.05;

@@ -13,7 +13,8 @@ use serde::Serialize;
 use super::Plan;
 use super::fit::{Fit, log_log_fit};
 use crate::cpu::pilot::MAX_LIGHTS_EXAMINED;
-use crate::packed::{FEW_LIGHTS, MAX_SPHERES};
+use crate::pack::FEW_LIGHTS;
+use crate::packed::MAX_SPHERES;
 use crate::scene::Choice;
 
 pub use measure::grow;

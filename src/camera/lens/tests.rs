@@ -2,8 +2,12 @@
 
 use super::super::chi_squared::{assert_uniform, critical, statistic};
 use super::*;
+use crate::distortion;
 use crate::math::{hash_u32, uniform_from_bits};
-use glam::DMat4;
+use crate::pack::camera::frame_camera;
+use crate::scene::projection::{LensError, check_distortion, project, undistort};
+use crate::scene::{Aperture, Camera, Lens};
+use glam::{DMat4, DVec3};
 
 fn camera(distortion: [f64; 5]) -> Camera {
     let rotation = DMat4::from_rotation_y(0.7) * DMat4::from_rotation_x(-0.3);
@@ -330,7 +334,7 @@ fn distortion_round_trips() {
 #[test]
 fn distortion_follows_opencv() {
     // cv2.projectPoints by hand: x = 0.3, y = -0.2, r^2 = 0.13.
-    let k = [-0.1, 0.02, 0.003, -0.004, 0.005];
+    let k: [f64; 5] = [-0.1, 0.02, 0.003, -0.004, 0.005];
     let radial = 1.0 - 0.1 * 0.13 + 0.02 * 0.0169 + 0.005 * 0.002_197;
     let want = [
         0.3 * radial + 2.0 * 0.003 * -0.06 - 0.004 * (0.13 + 0.18),

@@ -11,6 +11,7 @@ use crate::cli::threads::ThreadsFlag;
 use crate::cli::values::{choice, rays_per_pixel};
 use crate::cli::{Failure, Outcome, say};
 use crate::files;
+use crate::output::remove_leftovers;
 use crate::scene::{BackendChoice, Composite, Estimator, SamplerKind, Scene};
 
 /// Where figures go, and on how many threads they are made.
@@ -48,6 +49,11 @@ impl OutputFlags {
                 folder.display()
             ))
         })?;
+        // References are kept there too.
+        remove_leftovers(folder, |output| {
+            let output = output.to_string_lossy();
+            names.contains(&output.as_ref()) || output.starts_with("reference-")
+        });
         Ok(folder)
     }
 }

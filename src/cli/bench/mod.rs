@@ -1,6 +1,5 @@
 //! `mixray bench`: time against error, and the other measurements, each a subcommand.
 
-mod ablation;
 mod conclusions;
 mod docs;
 mod files;

@@ -5,7 +5,8 @@ use glam::Vec3;
 use super::{Random, fit, lit_by};
 use crate::light::lights::{env_arriving, light_pdf_hit, light_sample, light_select};
 use crate::material::{surface_at, triangle_emission};
-use crate::packed::{LIGHT_TRIANGLE, PackedScene, test_mesh, test_scene};
+use crate::pack::{test_mesh, test_scene};
+use crate::packed::{LIGHT_TRIANGLE, PackedScene};
 use crate::scene::{
     AlphaMode, Environment, EnvironmentMap, LightKind, Material, Side, Texture, TextureRef, Wrap,
 };

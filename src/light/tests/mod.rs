@@ -13,7 +13,8 @@ use glam::Vec3;
 
 use crate::camera::chi_squared::critical;
 use crate::math::{hash_combine, hash_u32, uniform_from_bits};
-use crate::packed::{PackedScene, test_scene};
+use crate::pack::test_scene;
+use crate::packed::PackedScene;
 use crate::scene::{Environment, EnvironmentMap, Light, LightKind, Side};
 
 /// Counter-based, so that every test draws the same numbers each time.

@@ -22,8 +22,8 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DMat4, DQuat, DVec3};
 
 use super::pose::rigid;
+use super::projection::check_distortion;
 use super::{Camera, SceneError};
-use crate::camera::lens::check_distortion;
 use crate::decode::{MAX_POSES_BYTES, read_file};
 
 /// Why a trajectory was refused. Displays as one line: "problem; expected ...; how to mend", with the file before it.

@@ -2,12 +2,11 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::AntialiasSettings;
+use super::{AntialiasSettings, is_binary};
 use crate::film::Picture;
 use crate::gpu::GpuError;
 use crate::shared::shared;
 use crate::stages::GpuStages;
-use crate::stages::antialias::is_binary;
 
 shared! {
     #[derive(Clone, Copy, Pod, Zeroable)]
@@ -20,7 +19,7 @@ shared! {
 }
 
 impl GpuStages {
-    /// Twin of [`crate::stages::antialias::antialias`].
+    /// Twin of [`antialias`](super::antialias).
     ///
     /// # Errors
     /// The picture does not fit the device, or the device was lost; the picture is then unchanged.

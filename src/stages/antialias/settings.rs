@@ -2,7 +2,7 @@
 
 use crate::scene::error::Result;
 use crate::scene::reader::Table;
-use crate::stages::settings::{StageSettings, read_into};
+use crate::stages::table::{StageSettings, read_into};
 
 /// Blending of virtual border pixels with their real neighbours, for pictures whose mask is binary.
 #[derive(Clone, Copy, Debug, PartialEq)]

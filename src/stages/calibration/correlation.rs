@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::quantisation::variance_before_rounding;
-use crate::scene::{Autocorrelation, LAGS, WHITE};
+use crate::stages::settings::{Autocorrelation, LAGS, WHITE};
 
 /// Pixels of all frame pairs that are looked at: more would only cost time.
 const ENOUGH_PIXELS: usize = 48_000_000;

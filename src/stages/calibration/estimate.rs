@@ -4,7 +4,7 @@ use super::correlation::Correlations;
 use super::moments::SceneMoments;
 use super::quantisation::variance_before_rounding;
 use super::{CalibrationError, HISTOGRAM_ENTRIES};
-use crate::scene::{Autocorrelation, NoiseBin, NoiseFit, NoiseProfile, bin_index};
+use crate::stages::settings::{Autocorrelation, NoiseBin, NoiseFit, NoiseProfile, bin_index};
 
 /// Parts of the picture whose estimates are compared for the confidence interval.
 const GROUPS: usize = 16;

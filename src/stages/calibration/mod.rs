@@ -29,7 +29,7 @@ pub use report::report_html;
 
 use std::path::PathBuf;
 
-use crate::scene::{MAX_BINS, NoiseProfile};
+use crate::stages::settings::{MAX_BINS, NoiseProfile};
 use correlation::Correlations;
 use estimate::{Statistics, profile_of};
 use moments::SceneMoments;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::correlation::Correlations;
 use super::frames::{Frame, SceneFrames};
 use super::{CalibrationError, HISTOGRAM_ENTRIES};
-use crate::scene::bin_index;
+use crate::stages::settings::bin_index;
 
 /// Buckets of the motion test's histogram of |residual|: 0.25 DN each.
 const MOTION_BUCKETS: usize = 1024;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::Calibration;
-use crate::scene::NoiseProfile;
+use crate::stages::settings::NoiseProfile;
 
 const COLORS: [&str; 3] = ["#c33", "#2a2", "#33c"];
 const NAMES: [&str; 3] = ["red", "green", "blue"];

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 
 use super::*;
-use crate::scene::NoiseProfile;
+use crate::stages::settings::NoiseProfile;
 
 /// SplitMix64 and the polar method: nothing shared with the code under test.
 struct Rng(u64);

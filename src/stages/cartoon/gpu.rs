@@ -2,12 +2,10 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{CartoonSettings, CartoonStyle, FlowSettings};
+use super::{Cartoon, CartoonSettings, CartoonStyle, EdgeResponses, FlowSettings, flow_weights};
 use crate::gpu::GpuError;
 use crate::shared::shared;
-use crate::stages::EncodedImage;
-use crate::stages::GpuStages;
-use crate::stages::cartoon::{Cartoon, EdgeResponses, flow_weights};
+use crate::stages::{EncodedImage, GpuStages};
 
 shared! {
     #[derive(Clone, Copy, Pod, Zeroable)]

@@ -111,17 +111,17 @@ fn layer_at(layer: &[[f32; 4]], width: u32, height: u32, x: f32, y: f32) -> [f32
         (0.0, 1.0, (1.0 - along) * down),
         (1.0, 1.0, along * down),
     ] {
-        let value = texel(layer, width, height, left + dx, top + dy);
-        for c in 0..4 {
-            sum[c] += weight * value[c];
+        if let Some(value) = texel(layer, width, height, left + dx, top + dy) {
+            for c in 0..4 {
+                sum[c] += weight * value[c];
+            }
         }
     }
     sum
 }
 
-fn texel(layer: &[[f32; 4]], width: u32, height: u32, column: f32, row: f32) -> [f32; 4] {
-    if column >= 0.0 && row >= 0.0 && column < width as f32 && row < height as f32 {
-        return layer[row as usize * width as usize + column as usize];
-    }
-    [0.0; 4]
+/// `None` beyond the border, where the twin has zeros.
+fn texel(layer: &[[f32; 4]], width: u32, height: u32, column: f32, row: f32) -> Option<&[f32; 4]> {
+    (column >= 0.0 && row >= 0.0 && column < width as f32 && row < height as f32)
+        .then(|| &layer[row as usize * width as usize + column as usize])
 }

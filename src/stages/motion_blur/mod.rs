@@ -2,12 +2,13 @@
 
 mod copies;
 mod gpu;
+mod motion;
 pub(super) mod settings;
 mod stage;
 #[cfg(test)]
 mod tests;
 
 pub use copies::{Copies, CopyLayer, draw_copies};
+pub use motion::{ObjectBlur, PictureMotion};
 pub use settings::{MotionBlurMethod, MotionBlurSettings};
 pub(super) use stage::STAGE;
-pub use stage::{ObjectBlur, PictureMotion};

@@ -2,7 +2,7 @@
 
 use crate::scene::error::Result;
 use crate::scene::reader::{Choice, Node, Table};
-use crate::stages::settings::{StageSettings, read_into};
+use crate::stages::table::{StageSettings, read_into};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotionBlurMethod {

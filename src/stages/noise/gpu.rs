@@ -2,12 +2,11 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::{LAGS, NoiseInput, NoiseSource, NoiseStage, sigma_table};
 use crate::film::Picture;
 use crate::gpu::GpuError;
 use crate::shared::shared;
 use crate::stages::GpuStages;
-use crate::stages::noise::{NoiseInput, NoiseSource, NoiseStage, sigma_table};
-use crate::stages::settings::LAGS;
 
 shared! {
     #[derive(Clone, Copy, Pod, Zeroable)]

@@ -208,7 +208,7 @@ fn solve(mut matrix: [[f64; FREE]; FREE], mut right: [f64; FREE]) -> [f64; FREE]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::WHITE;
+    use crate::stages::settings::WHITE;
 
     fn worst(a: &Autocorrelation, b: &Autocorrelation) -> f64 {
         let pairs = a.as_flattened().iter().zip(b.as_flattened());

@@ -9,7 +9,7 @@ pub use profile::{
 
 use crate::scene::error::Result;
 use crate::scene::reader::{Choice, Table};
-use crate::stages::settings::{StageSettings, read_into};
+use crate::stages::table::{StageSettings, read_into};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoiseMethod {

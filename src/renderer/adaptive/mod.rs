@@ -4,6 +4,8 @@
 //! more scrambles, which are not part of the picture, decides how many samples each tile's pixels take in each of them. A tile that the pilot
 //! underrated takes further scrambles of the same kind. Every sample that is taken counts, whatever it brings.
 
+mod series;
+
 use std::rc::Rc;
 use std::time::Instant;
 
@@ -11,13 +13,14 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::core::{Core, is_within_reach};
-use super::series::Series;
 use super::stopwatch::Stopwatch;
 use super::tiles::{MARGIN, Tiles, Trial, gain_for};
 use super::{Driver, ErrorGoal, RenderError, Renderer, Skip};
 use crate::film::{Film, Scrambles, composite, pooled};
 use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
 use crate::work::Watcher;
+
+use series::Series;
 
 /// Independent scrambles that make the picture, at the least.
 pub const SCRAMBLES: u32 = 16;

@@ -1,28 +1,31 @@
 //! `mixray bench SCENE...` and `mixray bench ablate SCENE...`: error against time, scene by scene.
 
+mod ablation;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::ablation::without_each;
-use super::command_line;
-use super::conclusions::conclude;
-use super::docs::Docs;
-use super::files::{Gallery, read_report, write_figures, write_pictures};
-use super::flags::{
-    OutputFlags, RaysFlag, RunFlags, finish, has_hardware_gpu, load_scenes, machine_of,
-};
-use super::regression::compare;
 use crate::bench::{
     FORMAT, Machine, Method, Plan, ReferenceGoal, Report, Source, markdown, measure, reference,
     text,
 };
+use crate::cli::bench::command_line;
+use crate::cli::bench::conclusions::conclude;
+use crate::cli::bench::docs::Docs;
+use crate::cli::bench::files::{Gallery, read_report, write_figures, write_pictures};
+use crate::cli::bench::flags::{
+    OutputFlags, RaysFlag, RunFlags, finish, has_hardware_gpu, load_scenes, machine_of,
+};
+use crate::cli::bench::regression::compare;
 use crate::cli::scene_flags::SceneFlags;
 use crate::cli::values::{above_zero, camera_noise, choice, rays_per_pixel};
 use crate::cli::{Failure, Outcome, interrupt, print, progress, say};
 use crate::renderer::{CameraNoise, SCRAMBLES, Skip, Watcher};
 use crate::scene::{BackendChoice, Choice, Estimator};
+
+use ablation::without_each;
 
 /// Flags that say what is measured, which nothing is with `--report`.
 const OF_MEASURING: [&str; 16] = [

@@ -4,20 +4,19 @@ use std::sync::Arc;
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
+use super::camera::frame_camera;
 use super::lights::pack_lights;
-use super::materials::{MaterialKey, MaterialTable};
-use super::{
+use crate::accel::{AccelError, WorldBvh};
+use crate::light::environment_table::environment_table;
+use crate::packed::materials::{MaterialKey, MaterialTable};
+use crate::packed::{
     ESTIMATOR_DIRECT, ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER,
     FRAME_SHUTTER_ORDERED, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE,
     PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, SAMPLER_CMJ, SAMPLER_JITTERED,
     SAMPLER_SOBOL, Triangle, Vertex,
 };
-use crate::accel::{AccelError, WorldBvh};
-use crate::camera::lens::frame_camera;
-use crate::light::environment_table::environment_table;
 use crate::scene::{
-    Aperture, EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind,
-    Scene, Side,
+    EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind, Scene, Side,
 };
 
 /// The anchor is kept while the camera stays within this distance of it, as a share of the distance that f32 resolves to 1e-7.
@@ -124,10 +123,6 @@ impl PackedScene {
         self.frame.flags &= !(FRAME_SHUTTER | FRAME_SHUTTER_ORDERED);
         let count = scene.camera.width as usize * scene.camera.height as usize;
         self.pixels = vec![PixelInfo::uniform(PIXEL_BEAM_MAY_MEET_VIRTUAL); count];
-        debug_assert!(matches!(
-            scene.lens.aperture,
-            Aperture::Disc | Aperture::Square | Aperture::Blades(_)
-        ));
     }
 
     /// Seed, sampler, estimator, bounces, exposure.

@@ -6,6 +6,7 @@ use glam::{DMat4, DVec3, Vec3};
 
 use super::*;
 use crate::accel::Ray;
+use crate::packed::*;
 use crate::scene::{
     AlphaMode, Environment, EnvironmentMap, Light as SceneLight, LightKind,
     Material as SceneMaterial, Scene, Side,

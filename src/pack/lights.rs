@@ -2,14 +2,14 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{
+use crate::light::rectangle::is_right_angle;
+use crate::material::texture_sample;
+use crate::math::luminance;
+use crate::packed::{
     FRAME_LIGHTS_SUFFICE, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD,
     LIGHT_SPOT, LIGHT_TRIANGLE, Light, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT, Material, NONE,
     PackedScene, SIDE_REAL, SIDE_VIRTUAL, TEXTURE_UV1, xyz,
 };
-use crate::light::rectangle::is_right_angle;
-use crate::material::texture_sample;
-use crate::math::luminance;
 use crate::scene::{LightKind, Scene, Side};
 
 /// Barycentric points at which the emission texture of a triangle is looked at.

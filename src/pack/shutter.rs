@@ -1,10 +1,10 @@
 //! The shutter in the frame, and the instants at which moving objects stand.
 
-use glam::{DMat4, DVec3};
+use glam::{DMat4, DQuat, DVec3};
 
-use super::{FRAME_SHUTTER, FRAME_SHUTTER_ORDERED, PackError, PackedScene, SHUTTER_POSES};
-use crate::camera::lens::project;
-use crate::camera::shutter::frame_poses;
+use super::build::PackError;
+use crate::packed::{FRAME_SHUTTER, FRAME_SHUTTER_ORDERED, Frame, PackedScene, SHUTTER_POSES};
+use crate::scene::projection::project;
 use crate::scene::{MotionBlurMethod, SamplerKind, Scene, Shutter};
 
 /// Where objects move, they stand still from one of these to the next.
@@ -153,4 +153,29 @@ pub fn row_ends(scene: &Scene, instant: &Instant, total: u32) -> Vec<u32> {
             (share.clamp(0.0, 1.0) * f64::from(total) + 0.5).floor() as u32
         })
         .collect()
+}
+
+/// Fills the frame's poses from those at equal steps of the shutter's time; false, and nothing changes, if they are all one.
+pub fn frame_poses(
+    world_from_camera: &[DMat4; SHUTTER_POSES],
+    anchor: DVec3,
+    frame: &mut Frame,
+) -> bool {
+    let first = world_from_camera[0];
+    if world_from_camera.iter().all(|pose| *pose == first) {
+        return false;
+    }
+    let mut before = DQuat::from_mat4(&first);
+    for (i, pose) in world_from_camera.iter().enumerate() {
+        let mut turned = DQuat::from_mat4(pose);
+        // Of the two quaternions of a rotation, the one nearer to the last, so that what lies between is short.
+        if turned.dot(before) < 0.0 {
+            turned = -turned;
+        }
+        before = turned;
+        let position = pose.w_axis.truncate() - anchor;
+        frame.shutter_poses[2 * i] = position.as_vec3().extend(0.0).to_array();
+        frame.shutter_poses[2 * i + 1] = turned.as_quat().to_array();
+    }
+    true
 }

@@ -1,9 +1,9 @@
 //! Rows that tell what a saving is worth: `direct` with it and without it, and what is rendered to a goal instead of a number of rays.
 
-use super::rows::{Arguments, Job};
+use super::{Arguments, Job};
 use crate::bench::{Aim, Goal, Method, Truth, rmse_of};
 use crate::cli::{Failure, progress, say};
-use crate::packed::instants;
+use crate::pack::instants;
 use crate::renderer::{CameraNoise, Skip, Watcher};
 use crate::scene::{BackendChoice, Choice, Estimator, NoiseFit, Scene};
 

@@ -2,13 +2,13 @@
 
 use std::rc::Rc;
 
-use super::adaptive::ToError;
-use super::core::is_within_reach;
-use super::{RenderError, still};
+use super::ToError;
 use crate::film::Scrambles;
 use crate::gpu::Changed;
 use crate::math::hash_combine;
 use crate::packed::{PIXEL_EDGE, PIXEL_OUT_OF_REACH, PixelInfo};
+use crate::renderer::core::is_within_reach;
+use crate::renderer::{RenderError, still};
 use crate::work::{Meter, Phase, Progress, Watcher};
 
 /// Keeps the scrambles' seeds apart from those that a user gives. The same number salts the turns in `cpu/estimator.rs`, which does no harm: that
