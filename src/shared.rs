@@ -204,6 +204,12 @@ impl SharedValue for f32 {
     }
 }
 
+impl SharedValue for glam::Vec3 {
+    fn value(self) -> Value {
+        self.to_array().value()
+    }
+}
+
 impl<const N: usize> SharedValue for [f32; N] {
     fn value(self) -> Value {
         Value::F32s(self.to_vec())

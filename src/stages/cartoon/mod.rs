@@ -20,7 +20,6 @@ mod simplify;
 #[cfg(test)]
 mod tests;
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use super::finish::{Shot, Stage};
@@ -34,7 +33,7 @@ pub use settings::{CartoonSettings, CartoonStyle, FlowSettings};
 
 shared! {
     /// Weights of red, green and blue in brightness (BT.601).
-    const LUMA: Vec3 = Vec3::new(0.299, 0.587, 0.114);
+    const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
     /// Largest values of U and V.
     const U_MAX: f32 = 0.436;
     const V_MAX: f32 = 0.615;

@@ -24,19 +24,19 @@ pub(super) struct Planes {
 /// BT.601 from encoded RGB in 0..=1: Y in 0..=1, |U| <= 0.436, |V| <= 0.615.
 pub(super) fn yuv_from_rgb(rgb: [f32; 3]) -> [f32; 3] {
     let [r, g, b] = rgb;
-    let y = LUMA.x * r + LUMA.y * g + LUMA.z * b;
+    let y = LUMA[0] * r + LUMA[1] * g + LUMA[2] * b;
     [
         y,
-        (b - y) * (U_MAX / (1.0 - LUMA.z)),
-        (r - y) * (V_MAX / (1.0 - LUMA.x)),
+        (b - y) * (U_MAX / (1.0 - LUMA[2])),
+        (r - y) * (V_MAX / (1.0 - LUMA[0])),
     ]
 }
 
 pub(super) fn rgb_from_yuv(yuv: [f32; 3]) -> [f32; 3] {
     let [y, u, v] = yuv;
-    let r = y + v * ((1.0 - LUMA.x) / V_MAX);
-    let b = y + u * ((1.0 - LUMA.z) / U_MAX);
-    [r, (y - LUMA.x * r - LUMA.z * b) / LUMA.y, b]
+    let r = y + v * ((1.0 - LUMA[0]) / V_MAX);
+    let b = y + u * ((1.0 - LUMA[2]) / U_MAX);
+    [r, (y - LUMA[0] * r - LUMA[2] * b) / LUMA[1], b]
 }
 
 impl Planes {
