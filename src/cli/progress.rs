@@ -1,6 +1,7 @@
 //! The progress bar: on stderr, and only where that is a terminal.
 
 use std::io::IsTerminal;
+use std::sync::Mutex;
 use std::time::Duration;
 
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
@@ -13,6 +14,8 @@ use crate::renderer::{Phase, Progress};
 pub(super) struct Bar {
     bar: Option<ProgressBar>,
     unit: &'static str,
+    /// Rays when they were last counted, and a second's worth of them in millions until then: they are counted pass by pass.
+    rate: Mutex<(u64, f64)>,
 }
 
 /// Of the bar's length.
@@ -28,7 +31,11 @@ impl Bar {
             tick(&bar, 200);
             bar
         });
-        Self { bar, unit }
+        Self {
+            bar,
+            unit,
+            rate: Mutex::default(),
+        }
     }
 
     pub(super) fn hear(&self, progress: &Progress) {
@@ -40,8 +47,16 @@ impl Bar {
         let mut message = String::new();
         if progress.phase == Phase::Rendering {
             let (samples, total, unit) = (progress.samples, progress.samples_total, self.unit);
-            let rate = progress.rays.traced() as f64 / seconds / 1e6;
-            message = format!(", {samples}/{total} {unit}, {rate:.2} Mrays/s");
+            message = format!(", {samples}/{total} {unit}");
+            let rays = progress.rays.traced();
+            if rays > 0
+                && let Ok(mut counted) = self.rate.lock()
+            {
+                if rays != counted.0 {
+                    *counted = (rays, rays as f64 / seconds / 1e6);
+                }
+                message += &format!(", {:.2} Mrays/s", counted.1);
+            }
         }
         if progress.share_done > 0.0 && seconds > 1.0 {
             let left = HumanDuration(Duration::try_from_secs_f64(left).unwrap_or(Duration::MAX));

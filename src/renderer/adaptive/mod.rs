@@ -98,6 +98,11 @@ impl Renderer {
         let outcome = driver.pilot_and_picture();
         driver.core.packed.frame = frame;
         driver.core.backend.set_frame(&driver.core.packed);
+        if !watcher.is_cancelled() {
+            // No more are wanted, though more may have been expected.
+            driver.expected = driver.done;
+            watcher.hear(&driver.progress());
+        }
         self.stated = Some(driver.state(outcome?));
         self.core.count_render(&stopwatch);
         Ok(())

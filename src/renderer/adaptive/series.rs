@@ -84,12 +84,11 @@ impl ToError<'_> {
             series.taken.push((number, taking_part));
             self.done += 1;
         }
-        watcher.hear(&self.progress());
         self.replay_late_edges(series)?;
         Ok(complete)
     }
 
-    fn progress(&self) -> Progress {
+    pub(super) fn progress(&self) -> Progress {
         let expected = self.expected.max(self.done);
         Progress {
             phase: Phase::Rendering,
