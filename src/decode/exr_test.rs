@@ -42,7 +42,7 @@ fn window() -> IntegerBounds {
     IntegerBounds::from_dimensions((WIDTH, HEIGHT))
 }
 
-fn red(bytes: &[u8]) -> Result<Vec<f32>, String> {
+fn red(bytes: &[u8]) -> std::result::Result<Vec<f32>, String> {
     match decode_image(bytes)?.pixels {
         Pixels::Linear(pixels) => Ok(pixels.iter().map(|pixel| pixel[0]).collect()),
         _ => Err("it is not linear".to_owned()),
