@@ -6,6 +6,8 @@
 mod channels;
 mod codes;
 mod exr;
+#[cfg(test)]
+mod exr_test;
 mod file;
 mod guard;
 mod hdr;
@@ -114,6 +116,10 @@ pub(crate) fn ensure_memory((width, height): (u32, u32), bytes_per_px: u64) -> R
         .map_err(|shortage| format!("{shortage}; expected a smaller image; resize it"))
 }
 
+/// Decoders' messages may have several lines.
 fn broken(error: impl std::fmt::Display) -> String {
+    let error = error.to_string();
+    let words: Vec<&str> = error.split_whitespace().collect();
+    let error = words.join(" ");
     format!("it cannot be decoded ({error}); expected a whole image; save it again")
 }

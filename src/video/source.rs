@@ -198,13 +198,16 @@ fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
         let is_picture = extension
             .and_then(|e| e.to_str().map(|e| EXTENSIONS.contains(&e)))
             .unwrap_or(false);
-        let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
+        let name = path.file_name().unwrap_or_default();
+        if !is_picture || name.as_encoded_bytes().starts_with(b".") {
             continue;
-        };
-        if is_picture && !name.starts_with('.') {
-            files::input(&path).map_err(unreadable)?;
-            pictures.push((name.to_owned(), path));
         }
+        let Some(name) = name.to_str() else {
+            let message = "its name is not UTF-8; expected frames whose names are text; rename it";
+            return Err(file_error(&path, message));
+        };
+        files::input(&path).map_err(unreadable)?;
+        pictures.push((name.to_owned(), path));
     }
     if pictures.is_empty() {
         return Err(file_error(

@@ -138,7 +138,7 @@ fn an_exr_whose_data_window_is_not_true_is_refused_before_memory_is_taken() {
 #[test]
 fn a_header_word_of_a_stream_that_is_not_ascii_is_read_as_any_other() {
     let folder = folder_of(None, SMALL);
-    let trajectory = "[[frame]]\nnumber = 0\nworld_from_camera = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]]\n";
+    let trajectory = "[[frame]]\nframe = 0\nworld_from_camera = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]]\n";
     std::fs::write(folder.path().join("t.toml"), trajectory).expect("a writable folder");
     let stream = |word: &[u8]| {
         let head = [b"YUV4MPEG2 W16 H12 F25:1 C444 ", word, b"\nFRAME\n"].concat();

@@ -46,21 +46,32 @@ impl Fuzzer {
     /// # Panics
     /// A reader refuses a valid file.
     pub fn all() -> Vec<Self> {
-        let all = readers::all().into_iter().map(|reader| {
-            let fuzzer = Self {
+        let all: Vec<Self> = (readers::all().into_iter())
+            .map(|reader| Self {
                 files: (reader.valid)(),
                 folder: folder(),
                 reader,
-            };
-            for (index, file) in fuzzer.files.iter().enumerate() {
-                let outcome = fuzzer.read(&(fuzzer.reader.wrap)(file.clone()));
-                if let Outcome::Refused(reason) | Outcome::Wrong(reason) = outcome {
-                    panic!("{}: valid file {index}: {reason}", fuzzer.reader.name);
-                }
-            }
-            fuzzer
+            })
+            .collect();
+        let problems: Vec<String> = all.iter().flat_map(Self::refused_valid_files).collect();
+        assert!(problems.is_empty(), "{}", problems.join("\n"));
+        all
+    }
+
+    fn refused_valid_files(&self) -> Vec<String> {
+        let outcomes = (self.files.iter().enumerate()).map(|(index, file)| {
+            let outcome = self.read(&(self.reader.wrap)(file.clone()));
+            (index, outcome)
         });
-        all.collect()
+        outcomes
+            .filter_map(|(index, outcome)| match outcome {
+                Outcome::Read => None,
+                Outcome::Refused(reason) | Outcome::Wrong(reason) => Some(format!(
+                    "{}: valid file {index}: {reason}",
+                    self.reader.name
+                )),
+            })
+            .collect()
     }
 
     /// Reads the inputs of these numbers.

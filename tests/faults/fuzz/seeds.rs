@@ -225,9 +225,8 @@ translation = [0, 0, 0]
 time_secs = 0.1
 translation = [0.05, 0, 0]
 [antialias]
-[noise]
-a = 0.02
-b = 0.5
+[motion_blur]
+min_length_px = 0.5
 "#;
 
 pub fn scenes() -> Vec<Vec<u8>> {
@@ -235,7 +234,7 @@ pub fn scenes() -> Vec<Vec<u8>> {
 }
 
 pub fn toml_poses() -> Vec<Vec<u8>> {
-    vec![b"frames_per_second = 25\n[camera]\nwidth = 32\nheight = 24\nfx = 30.0\nfy = 30.0\n[[frame]]\nnumber = 1\nworld_from_camera = [[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]]\n[[frame]]\nnumber = 2\nworld_from_camera = [[1, 0, 0, 0.6], [0, 1, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]]\n".to_vec()]
+    vec![b"frames_per_second = 25\n[camera]\nwidth = 32\nheight = 24\nfx = 30.0\nfy = 30.0\ncx = 16\ncy = 12\n[[frame]]\nframe = 1\nworld_from_camera = [[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]]\n[[frame]]\nframe = 2\nworld_from_camera = [[1, 0, 0, 0.6], [0, 1, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]]\n".to_vec()]
 }
 
 pub fn json_poses() -> Vec<Vec<u8>> {
