@@ -168,7 +168,7 @@ mod tests {
         assert_eq!(split_jpegs(&cut), [0..a, a..b, b + 2..b + 2 + n]);
         assert_eq!(
             split_jpegs(&PICTURE[..n - 1]),
-            [0..n - 1],
+            std::slice::from_ref(&(0..n - 1)),
             "the last is cut off"
         );
     }

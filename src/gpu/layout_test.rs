@@ -7,6 +7,9 @@ use wgpu::naga;
 use super::compose::{Composer, DECLARED, Features, item_name};
 use crate::shared::{Module, Value};
 
+/// Bytes of an array's element; name, offset and size of the fields.
+type RecordLayout<'a> = (usize, Vec<(&'a str, usize, usize)>);
+
 /// A composed and parsed kernel that uses every constant and record of a declaration.
 struct Reflected {
     module: naga::Module,
@@ -74,8 +77,8 @@ impl Reflected {
             .collect()
     }
 
-    /// By name: bytes of an array's element, and name, offset and size of the fields.
-    fn records(&self) -> HashMap<&str, (usize, Vec<(&str, usize, usize)>)> {
+    /// By name.
+    fn records(&self) -> HashMap<&str, RecordLayout<'_>> {
         self.module
             .types
             .iter()

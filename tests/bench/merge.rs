@@ -126,7 +126,7 @@ fn films_that_do_not_fit_are_refused() {
     folder.refuse("render scene.toml --rpp 4 --range 2..5 -o a.exr", "2..5");
     assert!(!folder.path("merged.exr").exists());
 
-    folder.write("scene.toml", &SCENE.replace("0.31", "0.32"));
+    folder.write("scene.toml", SCENE.replace("0.31", "0.32"));
     folder.refuse(&merge("part-1.exr"), "changed since");
     folder.succeed("render scene.toml --rpp 16 --range 4..8 -o other.exr");
     folder.refuse(&merge("other.exr"), "different scenes");

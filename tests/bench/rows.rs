@@ -93,7 +93,7 @@ fn a_changed_scene_gets_a_new_reference() {
     assert_eq!(source(), "cached");
     folder.write(
         "scene.toml",
-        &SCENE.replace("max_bounces = 2", "max_bounces = 3"),
+        SCENE.replace("max_bounces = 2", "max_bounces = 3"),
     );
     assert_eq!(source(), "made");
 }
@@ -136,7 +136,7 @@ fn a_regression_exits_with_1() {
     let row = &mut earlier["rows"][2];
     row["cpu_secs"] = (row["cpu_secs"].as_f64().unwrap() / 100.0).into();
     row["efficiency"] = (row["efficiency"].as_f64().unwrap() * 100.0).into();
-    folder.write("earlier.json", &earlier.to_string());
+    folder.write("earlier.json", earlier.to_string());
     let output = folder.run("bench --report out/results.json --against earlier.json");
     assert_eq!(output.status.code(), Some(1));
     let shown = String::from_utf8_lossy(&output.stdout);
@@ -145,7 +145,7 @@ fn a_regression_exits_with_1() {
     assert!(!other_way.contains("REGRESSION"), "control: it grew");
 
     earlier["format"] = 0.into();
-    folder.write("earlier.json", &earlier.to_string());
+    folder.write("earlier.json", earlier.to_string());
     folder.refuse(
         "bench --report out/results.json --against earlier.json",
         "format",

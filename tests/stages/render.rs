@@ -29,7 +29,7 @@ fn card(folder: &Folder, more: &str) {
     let scene = "[photo]\nimage = \"photo.png\"\n[camera]\nvertical_fov_deg = 45\n[lens]\naperture_radius_m = 0.08\nfocus_distance_m = 4.0\n\
          [environment]\nradiance = [0.5, 0.5, 0.5]\n[[virtual]]\nshape = \"quad\"\ncorner = [0, -3, -2]\nedge_u = [3, 0, 0]\nedge_v = [0, 6, 0]\n\
          material = { base_color = [0.4, 0.4, 0.4], specular = 0.0 }\n[render]\nbackend = \"cpu\"\n";
-    folder.write("scene.toml", &format!("{scene}{more}"));
+    folder.write("scene.toml", format!("{scene}{more}"));
 }
 
 /// Noise level by column, DN, rounding to codes taken out.

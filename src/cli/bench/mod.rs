@@ -33,7 +33,7 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Measurement {
-    Ablate(rows::Arguments),
+    Ablate(Box<rows::Arguments>),
     Growth(growth::Arguments),
     PaperTable(paper::Arguments),
     Stress(stress::Arguments),
