@@ -81,7 +81,7 @@ pub fn run() -> ExitCode {
 
 fn run_command() -> ExitCode {
     interrupt::survive_file_limits();
-    let arguments = Arguments::try_parse().unwrap_or_else(|error| end_with_usage(&error));
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| end_with_usage(error));
     files::guard_run();
     let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
@@ -123,13 +123,12 @@ fn read_photo(path: &Path) -> Result<Photo, Failure> {
     Ok(photo)
 }
 
-/// Help, or why the command line cannot be used. Names of files stand in it too.
-fn end_with_usage(error: &clap::Error) -> ! {
-    let text = error.render().to_string();
-    let safe = terminal::escaped(&text);
-    if safe != text {
-        terminal::print_aside(&text);
-        std::process::exit(error.exit_code());
-    }
-    error.exit()
+/// Help, or why the command line cannot be used. Names of files stand in it too: clap takes control sequences out of what it quotes, so
+/// that it is given them escaped.
+fn end_with_usage(error: clap::Error) -> ! {
+    let words = std::env::args_os().map(|word| terminal::escaped(&word.to_string_lossy()));
+    Arguments::try_parse_from(words)
+        .err()
+        .unwrap_or(error)
+        .exit()
 }

@@ -414,7 +414,7 @@ fn a_broken_image_is_named() {
     builder.json["bufferViews"][0]["byteLength"] = json!(40);
     let line = message(builder.load());
     assert!(
-        line.contains("images[0] (grey): cannot be decoded"),
+        line.contains("images[0] (grey): it cannot be decoded"),
         "{line}"
     );
     builder.json["bufferViews"][0]["byteOffset"] = json!(1);

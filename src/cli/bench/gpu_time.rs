@@ -33,7 +33,6 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let docs = arguments.output.start("gpu-time")?;
-    let machine = Machine::this(true);
     let interrupted = interrupt::watch()?;
     let scenes = load_scenes(
         &arguments.scenes,
@@ -41,6 +40,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         arguments.shrink,
         BackendChoice::Cpu,
     )?;
+    let machine = Machine::this(true);
     let folder = arguments.output.make_folder(&["gpu-time.json"])?;
     let rays_per_pixel = arguments.rays.ascending();
     let steps = progress::Steps::new((scenes.len() * rays_per_pixel.len()) as u64);
