@@ -4,6 +4,7 @@
 //! Ctrl-C with the picture written.
 
 mod antialias;
+#[cfg(feature = "bench")]
 mod bench;
 mod cartoon;
 mod compare;
@@ -47,6 +48,7 @@ enum Command {
     Render(render::Arguments),
     Sequence(sequence::Arguments),
     Merge(merge::Arguments),
+    #[cfg(feature = "bench")]
     Bench(Box<bench::Arguments>),
     Cartoon(cartoon::Arguments),
     Noise(noise::Arguments),
@@ -87,6 +89,7 @@ fn run_command() -> ExitCode {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Sequence(arguments) => sequence::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
+        #[cfg(feature = "bench")]
         Command::Bench(arguments) => bench::run(*arguments),
         Command::Cartoon(arguments) => all_threads().and_then(|()| cartoon::run(&arguments)),
         Command::Noise(arguments) => all_threads().and_then(|()| noise::run(&arguments)),

@@ -32,6 +32,7 @@ pub fn guard_run() {
 }
 
 /// The first output that was refused, in case that what met it could not say so.
+#[cfg(feature = "cli")]
 pub(crate) fn conflict() -> Option<Conflict> {
     with(|registry| registry.conflict()).flatten()
 }
@@ -96,6 +97,7 @@ pub(crate) fn output(path: &Path) -> Result<(), Conflict> {
 ///
 /// # Errors
 /// As [`output`].
+#[cfg(feature = "bench")]
 pub(crate) fn own(path: &Path) -> Result<(), Conflict> {
     output(path)?;
     with(|registry| registry.own(&resolved(path)));

@@ -69,6 +69,7 @@ pub(super) struct Registry {
 }
 
 impl Registry {
+    #[cfg(feature = "cli")]
     pub(super) fn conflict(&self) -> Option<Conflict> {
         self.conflict.clone()
     }
@@ -118,6 +119,7 @@ impl Registry {
         Ok(())
     }
 
+    #[cfg(feature = "bench")]
     pub(super) fn own(&mut self, path: &Path) {
         if let Some(index) = self.outputs.find(Some(path), None) {
             self.output_notes[index].own = true;

@@ -94,6 +94,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
 }
 
 /// As their namesakes, but no power cut is waited for: of what can be measured or drawn again.
+#[cfg(feature = "bench")]
 pub(crate) mod quick {
     use super::{OutputError, Path, Write, io_error, replace};
 

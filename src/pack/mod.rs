@@ -10,6 +10,7 @@ mod test_support;
 mod tests;
 
 pub use build::{PackError, next_anchor};
+#[cfg(feature = "bench")]
 pub(crate) use lights::FEW_LIGHTS;
 pub use shutter::{Instant, instants, row_ends, traced_shutter};
 #[cfg(test)]

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use allocation::{Rates, allocate};
 use beam::Beam;
 use blocks::Blocks;
+#[cfg(feature = "bench")]
 pub(crate) use importance::MAX_LIGHTS_EXAMINED;
 use importance::{PilotLights, importance};
 
