@@ -99,7 +99,8 @@ impl Tile<'_> {
     fn real_samples(&mut self, scene: &PackedScene, work: &PixelWork, rays: &mut RayCounts) {
         let sums = &mut self.sums[work.pixel as usize - self.first_pixel];
         for index in work.first..work.end {
-            let st = run(scene, begin_sample(scene, work.pixel, index, true), rays);
+            let mut st = begin_sample(scene, work.pixel, index, true);
+            run(scene, &mut st, rays);
             let real = st.result.radiance * scene.frame.exposure_scale;
             pixel_add_real(sums, index, st.result.mask != 0, real);
         }
@@ -114,7 +115,8 @@ fn main_sample(
     guide: Option<&mut GuideSums>,
     rays: &mut RayCounts,
 ) {
-    let st = run(scene, begin_sample(scene, pixel, index, false), rays);
+    let mut st = begin_sample(scene, pixel, index, false);
+    run(scene, &mut st, rays);
     let scale = scene.frame.exposure_scale;
     let is_virtual = st.result.mask != 0;
     let (contribution, real) = if scene.frame.estimator == ESTIMATOR_PAPER {
@@ -146,22 +148,19 @@ fn main_sample(
     }
 }
 
-fn run(scene: &PackedScene, mut st: PathState, rays: &mut RayCounts) -> PathState {
+/// Takes a sample to its end, where it stands: its state is too large to be moved for nothing.
+fn run(scene: &PackedScene, st: &mut PathState, rays: &mut RayCounts) {
     while st.path.stage != STAGE_DONE {
-        answer(scene, &mut st);
-        advance(scene, &mut st);
+        answer(scene, st);
+        advance(scene, st);
     }
     *rays += st.rays;
-    st
 }
 
 /// Real radiance of one sample before exposure, and the albedo of its first hit (0 where nothing is hit); wants `FRAME_AOVS`.
 pub fn render_first_hit(scene: &PackedScene, pixel: u32, index: u32) -> (Vec3, Vec3) {
-    let st = run(
-        scene,
-        begin_sample(scene, pixel, index, true),
-        &mut RayCounts::default(),
-    );
+    let mut st = begin_sample(scene, pixel, index, true);
+    run(scene, &mut st, &mut RayCounts::default());
     (st.result.radiance, st.first_hit.albedo)
 }
 
