@@ -418,7 +418,11 @@ fn a_broken_image_is_named() {
         "{line}"
     );
     builder.json["bufferViews"][0]["byteOffset"] = json!(1);
-    assert!(message(builder.load()).contains("not a PNG, JPEG or WebP"));
+    let line = message(builder.load());
+    assert!(
+        line.contains("images[0] (grey): its format is not known; expected PNG, JPEG or WebP"),
+        "{line}"
+    );
 }
 
 #[test]
