@@ -154,7 +154,10 @@ mod tests {
                 }
             }
         }
-        assert_eq!(samples, work.iter().map(|w| u64::from(w.samples())).sum());
+        assert_eq!(
+            samples,
+            work.iter().map(|w| u64::from(w.samples())).sum::<u64>()
+        );
         for pixel in 0..width * height {
             let n = if taken(pixel) { pixel + 1 } else { 0 };
             let at = pixel as usize;
