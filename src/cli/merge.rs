@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         .collect::<Result<Vec<_>, _>>()?;
     let mut parts = Vec::new();
     for path in &arguments.parts {
-        let (film, note) = read_film(path).map_err(Failure)?;
+        let (film, note) = read_film(path)?;
         parts.push(Part { path, film, note });
     }
     parts.sort_by_key(|part| part.note.range);

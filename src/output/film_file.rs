@@ -9,6 +9,7 @@ use super::ChannelFile;
 use super::exr_file::{Channels, push_channel, write_layers};
 use super::{Metadata, OutputError, Target};
 use crate::film::{Film, GuideSums, Picture, PixelSums, Planes, Sum3};
+use crate::refusal::Refusal;
 use crate::renderer::Without;
 use crate::scene::{Choice, Composite, Estimator, Overrides, SamplerKind, Scene, Settings};
 
@@ -250,9 +251,9 @@ fn folder_of(path: &Path) -> &Path {
 ///
 /// # Errors
 /// In one line: the file cannot be read, holds no film or one of another form, or sums that are not finite.
-pub fn read_film(path: &Path) -> Result<(Film, FilmNote), String> {
+pub fn read_film(path: &Path) -> Result<(Film, FilmNote), Refusal> {
     let file = ChannelFile::read(path)?;
-    let refused = |problem: String| format!("{}: {problem}", path.display());
+    let refused = |problem: String| Refusal::from(format!("{}: {problem}", path.display()));
     let Some(text) = file.texts.get(NOTE) else {
         return Err(refused(match file.texts.contains_key(NOTE_OF_FORM_1) {
             true => format!("is a film written by mixray of an earlier form; expected form {FORM}; render it again"),
@@ -578,7 +579,7 @@ mod tests {
             let mut film = film();
             damage(&mut film);
             let (_folder, target) = written(&film);
-            let message = read_film(target.path()).unwrap_err();
+            let message = read_film(target.path()).unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
         }
     }

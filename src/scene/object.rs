@@ -128,7 +128,7 @@ impl<'w> ObjectReader<'w> {
             Some(mesh) => Rc::clone(mesh),
             None => {
                 let mesh = load_within(&path, key.1.as_deref(), node.sandbox())
-                    .map_err(|error| node.file_error(&path, &advise(&error.problem)))?;
+                    .map_err(|error| node.file_error(&path, advise(&error.problem)))?;
                 self.warnings
                     .extend(node.file_warnings(mesh.warnings.clone()));
                 let mesh = Rc::new(mesh);

@@ -25,6 +25,7 @@ use super::pose::rigid;
 use super::projection::check_distortion;
 use super::{Camera, SceneError};
 use crate::decode::{MAX_POSES_BYTES, read_file};
+use crate::refusal::Refusal;
 
 /// Why a trajectory was refused. Displays as one line: "problem; expected ...; how to mend", with the file before it.
 #[derive(Debug, thiserror::Error)]
@@ -69,13 +70,13 @@ impl Intrinsics {
         &self,
         (width, height): (u32, u32),
         world_from_camera: DMat4,
-    ) -> std::result::Result<Camera, String> {
+    ) -> std::result::Result<Camera, Refusal> {
         if let Some((own_width, own_height)) = self.size
             && (own_width, own_height) != (width, height)
         {
             return Err(format!(
                 "the intrinsics are those of {own_width} x {own_height} pixels where the frames have {width} x {height}"
-            ));
+            ).into());
         }
         let camera = Camera {
             width,

@@ -9,6 +9,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::decode::{MAX_TEXT_BYTES, read_text};
+use crate::refusal::Refusal;
 
 /// Version of the file format that this program reads and writes.
 pub const NOISE_PROFILE_VERSION: i64 = 1;
@@ -101,7 +102,7 @@ impl NoiseProfile {
     }
 
     /// Reads a profile file. An error reads "problem; expected ...; how to mend" and leaves out the path.
-    pub fn read(path: &Path) -> Result<Self, String> {
+    pub fn read(path: &Path) -> Result<Self, Refusal> {
         let text = read_text(path, MAX_TEXT_BYTES).map_err(|reason| {
             format!("it cannot be read ({reason}); expected a noise profile; correct the path")
         })?;
@@ -109,7 +110,7 @@ impl NoiseProfile {
     }
 
     /// The profile of a file's text; errors as [`NoiseProfile::read`].
-    pub fn from_toml(text: &str) -> Result<Self, String> {
+    pub fn from_toml(text: &str) -> Result<Self, Refusal> {
         let broken = |error: toml::de::Error| {
             format!(
                 "it is no noise profile ({}); expected a file of `mixray noise calibrate`; calibrate again",
@@ -121,13 +122,14 @@ impl NoiseProfile {
             return Err(format!(
                 "its format is \"{}\"; expected \"{FORMAT}\"; calibrate again",
                 head.format
-            ));
+            )
+            .into());
         }
         if head.version != NOISE_PROFILE_VERSION {
             return Err(format!(
                 "it is a noise profile of version {}; expected version {NOISE_PROFILE_VERSION}; calibrate again with this program",
                 head.version
-            ));
+            ).into());
         }
         let file: File = toml::from_str(text).map_err(broken)?;
         let profile = Self {
@@ -150,12 +152,13 @@ impl NoiseProfile {
 
     /// # Errors
     /// What no camera measures, in one line.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), Refusal> {
         let count = self.bins.len();
         if !count.is_power_of_two() || count > MAX_BINS {
             return Err(format!(
                 "it has {count} bins; expected a power of two, at most {MAX_BINS}; calibrate again"
-            ));
+            )
+            .into());
         }
         let sigmas = self.bins.iter().flat_map(|bin| bin.sigma);
         let means = self.bins.iter().flat_map(|bin| bin.mean);
@@ -163,8 +166,7 @@ impl NoiseProfile {
             || means.clone().any(|mean| !(mean.abs() <= 255.0))
         {
             return Err(
-                "a mean or sigma is no number from 0 to 255 DN; expected measured values; calibrate again, or give other numbers"
-                    .to_owned(),
+                "a mean or sigma is no number from 0 to 255 DN; expected measured values; calibrate again, or give other numbers".into(),
             );
         }
         let lags = self.autocorrelation.as_flattened().as_flattened();
@@ -173,7 +175,7 @@ impl NoiseProfile {
         if correlations.clone().any(|rho| !(rho.abs() <= 1.5)) {
             return Err(
                 "a correlation is not within -1 and 1; expected measured values; calibrate again"
-                    .to_owned(),
+                    .into(),
             );
         }
         Ok(())
@@ -347,18 +349,22 @@ mod tests {
             ("[fit]", "[fits]", "no noise profile"),
             ("filled", "full", "no noise profile"),
         ] {
-            let message = NoiseProfile::from_toml(&text.replace(from, to)).unwrap_err();
+            let message = NoiseProfile::from_toml(&text.replace(from, to))
+                .unwrap_err()
+                .to_string();
             assert!(message.contains(part), "{message}");
         }
         let three = text.rsplit_once("\n[[bin]]").unwrap().0;
         assert!(
             NoiseProfile::from_toml(three)
                 .unwrap_err()
+                .to_string()
                 .contains("3 bins")
         );
         assert!(
             NoiseProfile::from_toml("a = 1")
                 .unwrap_err()
+                .to_string()
                 .contains("no noise profile")
         );
     }
