@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::{Errors, Goal, Machine, Reach};
+use crate::Refusal;
 use crate::decode::{MAX_TEXT_BYTES, read_text};
 use crate::renderer::{RayCounts, Skip};
 use crate::scene::{BackendChoice, Composite, Estimator, SamplerKind};
@@ -33,8 +34,8 @@ impl Report {
     ///
     /// # Errors
     /// The file, and why it is none.
-    pub fn read(path: &Path) -> Result<Self, String> {
-        let problem = |reason: String| format!("{}: {reason}", path.display());
+    pub fn read(path: &Path) -> Result<Self, Refusal> {
+        let problem = |reason: String| Refusal::from(format!("{}: {reason}", path.display()));
         let text = read_text(path, MAX_TEXT_BYTES).map_err(problem)?;
         let value: serde_json::Value = serde_json::from_str(&text)
             .map_err(|error| problem(format!("is no results.json: {error}")))?;

@@ -140,7 +140,7 @@ impl Arguments {
         self.check_direct()?;
         self.check_goals()?;
         let docs = (self.output).start(if self.ablate { "ablate" } else { "bench" })?;
-        let earlier = (self.against.as_deref().map(Report::read).transpose()).map_err(Failure)?;
+        let earlier = self.against.as_deref().map(Report::read).transpose()?;
         let camera_noise = self.camera_noise.as_deref().map(camera_noise).transpose()?;
         let mut scenes = load_scenes(&self.scenes, self.scene, self.runs.shrink)?;
         // Asks for graphics devices, which may take seconds: after all that may be refused.
@@ -194,7 +194,7 @@ pub(super) fn run(arguments: Arguments) -> Result<Outcome, Failure> {
     let arguments = &job.arguments;
     let (report, interrupted) = match &arguments.report {
         Some(path) => {
-            let mut report = Report::read(path).map_err(Failure)?;
+            let mut report = Report::read(path)?;
             if arguments.target_rmse.is_some() {
                 conclude(&mut report, arguments.target_rmse);
             }
