@@ -120,7 +120,7 @@ impl NoiseProfile {
         let head: Head = toml::from_str(text).map_err(broken)?;
         if head.format != FORMAT {
             return Err(format!(
-                "its format is \"{}\"; expected \"{FORMAT}\"; calibrate again",
+                "its format is {:?}; expected \"{FORMAT}\"; calibrate again",
                 head.format
             )
             .into());
@@ -342,6 +342,11 @@ mod tests {
                 "mixray noise profile\"",
                 "other\"",
                 "its format is \"other\"",
+            ),
+            (
+                "mixray noise profile\"",
+                "of two\\nlines\"",
+                "its format is \"of two\\nlines\"",
             ),
             ("sigma = [1.5", "sigma = [-1.5", "0 to 255 DN"),
             ("sigma = [1.5", "sigma = [nan", "no noise profile"),
