@@ -11,22 +11,7 @@ import package::math::{INV_PI, dot3, orthonormal_basis, sincos_2pi};
 import package::material::normal::unit;
 import package::material::surface::Surface;
 
-
-struct BsdfEval {
-    f_cos: vec3<f32>,
-    pdf: f32,
-}
-
 const EVAL_NOTHING = BsdfEval(vec3<f32>(0.0, 0.0, 0.0), 0.0);
-
-struct BsdfSample {
-    wi: vec3<f32>,
-    weight: vec3<f32>,
-    pdf: f32,
-    delta: bool,
-    transmitted: bool,
-    valid: bool,
-}
 
 const SAMPLE_NOTHING = BsdfSample(vec3<f32>(0.0, 0.0, 1.0), vec3<f32>(0.0, 0.0, 0.0), 0.0, false, false, false);
 

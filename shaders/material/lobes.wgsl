@@ -6,15 +6,6 @@ import package::material::ggx::MIN_COS;
 import package::math::dot3;
 import package::material::surface::Surface;
 
-
-struct Interface {
-    reflected: vec3<f32>,
-    transmitted: vec3<f32>,
-    reflect_probability: f32,
-    transmit_probability: f32,
-    total: f32,
-}
-
 struct Lobes {
     coat: f32,
     interface_: Interface,

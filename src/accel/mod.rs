@@ -25,8 +25,6 @@ pub(crate) mod trace;
 mod wide;
 
 #[cfg(all(test, feature = "bench"))]
-mod gpu_tests;
-#[cfg(all(test, feature = "bench"))]
 mod tests;
 
 use std::sync::{Mutex, OnceLock};

@@ -9,5 +9,5 @@ pub mod state;
 mod surfaces;
 pub mod vertex;
 
-pub use pilot::pilot;
+pub use pilot::{pilot, pilot_steps};
 pub use surfaces::diffuse_surfaces;

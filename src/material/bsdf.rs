@@ -37,37 +37,37 @@ shared! {
     /// A mirrored or refracted direction that rounding put on the wrong side of the surface is lifted to this height.
     const GRAZING_LIFT: f32 = 1e-4;
     const LARGEST_BELOW_1: f32 = 0.999_999_94;
-}
 
-/// Non-delta lobes for one pair of directions.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BsdfEval {
-    /// BSDF times |cos| of `wi`, 1/sr.
-    pub f_cos: Vec3,
-    /// Solid-angle density with which [`bsdf_sample`] draws `wi`; integrates to 1 less the probability of delta lobes and of
-    /// samples that fall below the surface.
-    pub pdf: f32,
+    /// Non-delta lobes for one pair of directions.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub value struct BsdfEval {
+        /// BSDF times |cos| of `wi`, 1/sr.
+        pub f_cos: Vec3,
+        /// Solid-angle density with which [`bsdf_sample`] draws `wi`; integrates to 1 less the probability of delta lobes and of
+        /// samples that fall below the surface.
+        pub pdf: f32,
+    }
+
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub value struct BsdfSample {
+        /// Unit.
+        pub wi: Vec3,
+        /// f cos / pdf of the whole non-delta mixture, or of the delta lobe over its selection probability.
+        pub weight: Vec3,
+        /// Solid angle; 0 if `delta`.
+        pub pdf: f32,
+        pub delta: bool,
+        /// `wi` is on the other side of the surface.
+        pub transmitted: bool,
+        /// False: the path ends here.
+        pub valid: bool,
+    }
 }
 
 const EVAL_NOTHING: BsdfEval = BsdfEval {
     f_cos: Vec3::ZERO,
     pdf: 0.0,
 };
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BsdfSample {
-    /// Unit.
-    pub wi: Vec3,
-    /// f cos / pdf of the whole non-delta mixture, or of the delta lobe over its selection probability.
-    pub weight: Vec3,
-    /// Solid angle; 0 if `delta`.
-    pub pdf: f32,
-    pub delta: bool,
-    /// `wi` is on the other side of the surface.
-    pub transmitted: bool,
-    /// False: the path ends here.
-    pub valid: bool,
-}
 
 const SAMPLE_NOTHING: BsdfSample = BsdfSample {
     wi: Vec3::Z,

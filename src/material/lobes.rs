@@ -20,19 +20,19 @@ shared! {
     const COAT_F0: f32 = 0.04;
     /// Albedos up to this count as none: their reciprocal would overflow.
     pub const NO_ALBEDO: f32 = 1e-30;
-}
 
-/// Share of light that an interface facet reflects and lets through.
-#[derive(Clone, Copy, Debug)]
-pub struct Interface {
-    pub reflected: Vec3,
-    pub transmitted: Vec3,
-    /// max(reflected) / (max(reflected) + max(transmitted)): the probability of reflection.
-    pub reflect_probability: f32,
-    /// 1 - reflect_probability, without cancellation.
-    pub transmit_probability: f32,
-    /// max(reflected) + max(transmitted).
-    pub total: f32,
+    /// Share of light that an interface facet reflects and lets through.
+    #[derive(Clone, Copy, Debug)]
+    pub value struct Interface {
+        pub reflected: Vec3,
+        pub transmitted: Vec3,
+        /// max(reflected) / (max(reflected) + max(transmitted)): the probability of reflection.
+        pub reflect_probability: f32,
+        /// 1 - reflect_probability, without cancellation.
+        pub transmit_probability: f32,
+        /// max(reflected) + max(transmitted).
+        pub total: f32,
+    }
 }
 
 /// What lobe selection needs: approximate albedos, and the probabilities that follow from them.

@@ -4,7 +4,7 @@
 //! Each file has a WGSL twin of the same name in `shaders/`.
 
 pub(crate) mod bsdf;
-mod fresnel;
+pub(crate) mod fresnel;
 pub(crate) mod ggx;
 pub(crate) mod lobes;
 mod normal;

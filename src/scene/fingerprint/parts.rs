@@ -8,9 +8,9 @@ use crate::scene::trajectory::{Entry, EntryKey, Intrinsics};
 use crate::scene::{
     AlphaMode, AntialiasSettings, Aperture, BackendChoice, Camera, CartoonSettings, CartoonStyle,
     Composite, Environment, EnvironmentMap, Estimator, Exposure, FlowSettings, Instance, Lens,
-    Light, LightKind, Material, MotionBlurMethod, MotionBlurSettings, MotionKey, NoiseBin,
-    NoiseFit, NoiseMethod, NoiseProfile, NoiseSettings, Object, Photo, Primitive, SamplerKind,
-    Settings, Shutter, Side, Stages, Texture, TextureRef, Wrap,
+    Light, LightKind, MotionBlurMethod, MotionBlurSettings, MotionKey, NoiseBin, NoiseFit,
+    NoiseMethod, NoiseProfile, NoiseSettings, Object, Photo, Primitive, SamplerKind, Settings,
+    Shutter, Side, Stages, Texture, TextureRef, Wrap,
 };
 
 content! {
@@ -31,11 +31,6 @@ content! {
     AnimatedNode { parent, rest, translation, rotation, scale }
     Track { times, values, interpolation }
 
-    Material {
-        base_color, base_color_texture, metallic, roughness, metallic_roughness_texture, normal_texture, normal_scale, emissive,
-        emissive_texture, alpha_mode, unlit, ior, specular, specular_texture, specular_color, specular_color_texture, transmission,
-        transmission_texture, thin_walled, attenuation_color, attenuation_distance_m, clearcoat, clearcoat_texture, clearcoat_roughness,
-        clearcoat_roughness_texture, clearcoat_normal_texture, clearcoat_normal_scale; name }
     TextureRef { texture, uv_set, transform }
     Texture { width, height, rgba8, wrap_u, wrap_v, nearest; name }
 
