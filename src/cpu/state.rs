@@ -32,6 +32,7 @@ shared! {
     pub const STAGE_DIFFERENCE_BSDF: u32 = 8;
     /// Real pass: waiting for both worlds along the primary ray.
     pub const STAGE_REAL_PASS: u32 = 9;
+    pub const STAGE_COUNT: u32 = 10;
 
     /// Path through real and virtual geometry.
     pub const MODE_MIXED: u32 = 0;

@@ -141,9 +141,9 @@ impl PixelSums {
         }
     }
 
-    /// Adds `count` samples of the main pass that met nothing virtual and bring no difference.
-    pub fn add_nothing(&mut self, count: u32) {
-        self.n += count;
+    /// Adds a sample of the main pass that met nothing virtual and brings no difference.
+    pub fn add_nothing(&mut self) {
+        self.n += 1;
     }
 
     /// Adds the sums of later samples of the same pixel.

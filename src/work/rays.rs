@@ -9,7 +9,7 @@ use crate::shared::shared;
 
 shared! {
     /// Rays that one sample, or one batch of the GPU, has traced, as [`RayCounts`].
-    #[derive(Clone, Copy, Debug, Default, AnyBitPattern)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, AnyBitPattern)]
     pub struct SampleRays {
         pub primary: u32,
         pub mixed: u32,

@@ -4,9 +4,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::blocks::Blocks;
-use crate::cpu::estimator::{advance, begin_sample};
-use crate::cpu::request::answer;
-use crate::cpu::state::{PathState, STAGE_DONE};
+use crate::cpu::batch::run_alone;
+use crate::cpu::estimator::begin_sample;
+use crate::cpu::state::PathState;
 use crate::film::is_unusable;
 use crate::math::{hash_combine, hash_u32};
 use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene};
@@ -83,10 +83,7 @@ pub fn measure(scene: &PackedScene, blocks: &Blocks, done: impl Fn() + Sync) -> 
 fn add_pixel(scene: &PackedScene, pixel: u32, index: u32, moments: &mut BlockMoments) {
     let [a, b] = [index, index + 1].map(|index| {
         let mut st = begin_sample(scene, pixel, index, false);
-        while st.path.stage != STAGE_DONE {
-            answer(scene, &mut st);
-            advance(scene, &mut st);
-        }
+        run_alone(scene, &mut st);
         st
     });
     let radiance = |st: &PathState| st.result.radiance * scene.frame.exposure_scale;

@@ -1,4 +1,3 @@
-use crate::work::Watcher;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::*;
@@ -7,7 +6,7 @@ use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
 use crate::scene::{Environment, EnvironmentMap, Material, Side};
 
 /// A square before half of a bright sky, six tiles.
-fn scene() -> PackedScene {
+pub fn scene() -> PackedScene {
     let mut scene = test_scene();
     let camera = &mut scene.camera;
     (camera.width, camera.height) = (64, 48);
@@ -54,7 +53,7 @@ fn a_cancelled_render_leaves_whole_pixels_and_what_is_left_completes_it() {
             assert!(n == 0 || n == work.samples());
         }
         let left = work.left(&film);
-        assert_eq!(left.pixels.len(), work.pixels.len() - 2 * TILE_PIXELS);
+        assert_eq!(left.pixels.len(), work.pixels.len() - 2 * 64 * 8);
         assert!(film != whole, "control: it was cancelled");
         again += render(&scene, &mut film, &left, &Watcher::none());
         assert!(film == whole && again == rays);

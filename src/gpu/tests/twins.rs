@@ -42,7 +42,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("cpu::vertex", "max_element", "glam has it"),
     (
         "cpu::estimator",
-        "samples_without_turn",
+        "is_without_turn",
         "the host counts what it need not send",
     ),
     (
