@@ -8,7 +8,7 @@ mod camera;
 mod environment;
 pub(crate) mod error;
 mod file;
-mod fingerprint;
+pub(crate) mod fingerprint;
 pub mod gltf;
 mod light;
 mod material;

@@ -10,6 +10,7 @@ use serde::Deserialize;
 
 use crate::decode::{MAX_TEXT_BYTES, read_text};
 use crate::refusal::Refusal;
+use crate::scene::fingerprint::content;
 
 /// Version of the file format that this program reads and writes.
 pub const NOISE_PROFILE_VERSION: i64 = 1;
@@ -71,6 +72,12 @@ impl NoiseFit {
     pub fn variance(&self, y: f64) -> f64 {
         (self.a * y + self.b).max(0.0)
     }
+}
+
+content! {
+    NoiseProfile { bins, autocorrelation, channel_correlation, fit; sources }
+    NoiseBin { mean, sigma, low, high, samples, filled }
+    NoiseFit { a, b }
 }
 
 impl NoiseProfile {
