@@ -3,7 +3,7 @@
 import package::gpu::buffers::{frame, materials};
 import package::packed::records::{
     FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED,
-    MATERIAL_UNLIT,
+    MATERIAL_UNLIT, SIDE_REAL, SIDE_VIRTUAL,
 };
 import package::shared::NONE;
 import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample};
@@ -59,7 +59,7 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
         return;
     }
     let side = select(0u, 1u, (*st).vertex_hit.triangle >= frame.real_triangle_count);
-    let leaves_coinciding_real = side == 1u && (*st).ray.side == 0u && coincides(st, s, distance);
+    let leaves_coinciding_real = side == SIDE_VIRTUAL && (*st).ray.side == SIDE_REAL && coincides(st, s, distance);
     let reach = 1.0 + COINCIDENCE * distance / s.error;
     (*st).ray.origin = RayOrigin(
         s.position,
@@ -152,7 +152,7 @@ fn light_contribution(
     st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques, l: LightSample,
 ) -> vec3<f32> {
     let difference = is_difference(st);
-    let real_light = l.side == 0u;
+    let real_light = l.side == SIDE_REAL;
     if l.pdf <= 0.0 || ((*st).path.mode == MODE_REAL && !real_light) { return vec3<f32>(0.0); }
     @if(!paper) {
         let asks_both = (frame.flags & FRAME_BOTH_SHADOWS) != 0u;
@@ -183,7 +183,7 @@ fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample, contrib
     if l.distance < FAR {
         (*st).ray.t_max = l.distance - SHADOW_SHORTEN * l.distance - SHADOW_SHORTEN_ERRORS * s.error;
     }
-    let real_light = l.side == 0u;
+    let real_light = l.side == SIDE_REAL;
     var request = REQUEST_SHADOW_MIXED;
     if is_difference(st) && real_light { request = REQUEST_SHADOW_DIFFERENCE; }
     if (*st).path.mode == MODE_REAL { request = REQUEST_SHADOW_REAL; }

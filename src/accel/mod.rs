@@ -26,8 +26,6 @@ mod tree;
 mod wide;
 
 #[cfg(all(test, feature = "bench"))]
-mod gpu_tests;
-#[cfg(all(test, feature = "bench"))]
 mod tests;
 
 use std::sync::OnceLock;

@@ -11,5 +11,5 @@ mod surfaces;
 mod tiles;
 pub mod vertex;
 
-pub use pilot::pilot;
+pub use pilot::{pilot, pilot_steps};
 pub use surfaces::diffuse_surfaces;

@@ -9,7 +9,7 @@ use glam::Vec3;
 use crate::accel::Hit;
 use crate::packed::NONE;
 use crate::shared::shared;
-use crate::work::RayCounts;
+use crate::work::SampleRays;
 
 shared! {
     /// Finished; the results stand in the accumulators.
@@ -109,7 +109,7 @@ shared! {
         pub t_max: f32,
         /// `REQUEST_*`.
         pub request: u32,
-        /// World of the vertex that it leaves: 0 real, 1 virtual, [`SIDE_NONE`].
+        /// World of the vertex that it leaves: `SIDE_REAL`, `SIDE_VIRTUAL` or [`SIDE_NONE`].
         pub side: u32,
         /// Surface interactions up to and including the vertex that it leaves.
         pub depth: u32,
@@ -221,7 +221,7 @@ pub struct PathState {
     pub first_hit: FirstHit,
     /// The vertex to be shaded next.
     pub vertex_hit: Hit,
-    pub rays: RayCounts<u32>,
+    pub rays: SampleRays,
 }
 
 /// A ray that met nothing.
@@ -297,6 +297,6 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
             pad: 0,
         },
         vertex_hit: MISS,
-        rays: RayCounts::default(),
+        rays: SampleRays::default(),
     }
 }

@@ -17,7 +17,7 @@ use crate::math::{dot3, exp_, safe_sqrt};
 use crate::packed::{
     ESTIMATOR_PAPER, FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES,
     FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE,
-    PackedScene,
+    PackedScene, SIDE_REAL, SIDE_VIRTUAL,
 };
 use crate::shared::shared;
 
@@ -75,8 +75,13 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     {
         return;
     }
-    let side = u32::from(st.vertex_hit.triangle >= scene.frame.real_triangle_count);
-    let leaves_coinciding_real = side == 1 && st.ray.side == 0 && coincides(st, s, distance);
+    let side = if st.vertex_hit.triangle < scene.frame.real_triangle_count {
+        SIDE_REAL
+    } else {
+        SIDE_VIRTUAL
+    };
+    let leaves_coinciding_real =
+        side == SIDE_VIRTUAL && st.ray.side == SIDE_REAL && coincides(st, s, distance);
     let reach = 1.0 + COINCIDENCE * distance / s.error;
     st.ray.origin = RayOrigin {
         position: s.position,
@@ -212,7 +217,7 @@ fn light_contribution(
     l: &LightSample,
 ) -> Vec3 {
     let difference = is_difference(st);
-    let real_light = l.side == 0;
+    let real_light = l.side == SIDE_REAL;
     if l.pdf <= 0.0 || (st.path.mode == MODE_REAL && !real_light) {
         return Vec3::ZERO;
     }
@@ -251,7 +256,7 @@ fn plan_shadow(st: &mut PathState, s: &Surface, l: &LightSample, contribution: V
     } else {
         f32::INFINITY
     };
-    let real_light = l.side == 0;
+    let real_light = l.side == SIDE_REAL;
     st.ray.request = match st.path.mode {
         MODE_DIFFERENCE if real_light => REQUEST_SHADOW_DIFFERENCE,
         MODE_REAL => REQUEST_SHADOW_REAL,

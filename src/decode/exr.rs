@@ -397,3 +397,6 @@ fn is_rec709(c: &Chromaticities) -> bool {
         .zip(rec709)
         .all(|(given, rec709)| (given - rec709).abs() < 1e-3)
 }
+
+#[cfg(test)]
+mod tests;

@@ -18,9 +18,13 @@ use crate::packed::{
 use crate::scene::{
     EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind, Scene, Side,
 };
+use crate::work::{Meter, Phase, Watcher};
 
 /// The anchor is kept while the camera stays within this distance of it: f32 resolves 1 m to 1e-7 m.
 const ANCHOR_REACH_M: f64 = 1.0;
+
+/// What a triangle of a tree takes, where packing it is one step.
+const STEPS_OF_A_TREE: u64 = 4;
 
 #[derive(Debug, thiserror::Error)]
 pub enum PackError {
@@ -42,45 +46,41 @@ impl PackedScene {
     ///
     /// # Errors
     /// More triangles or texels than 32-bit indices address, or an acceleration structure cannot be built.
-    pub fn build(scene: &Scene) -> Result<Self, PackError> {
-        Self::build_at(scene, scene.camera.world_from_camera.w_axis.truncate())
+    pub fn build(scene: &Scene, watcher: &Watcher<'_>) -> Result<Self, PackError> {
+        Self::build_at(
+            scene,
+            scene.camera.world_from_camera.w_axis.truncate(),
+            watcher,
+        )
     }
 
     /// [`PackedScene::build`] anchored at a point of the world, which should be near the camera.
     ///
     /// # Errors
     /// As [`PackedScene::build`].
-    pub fn build_at(scene: &Scene, anchor: DVec3) -> Result<Self, PackError> {
+    pub fn build_at(
+        scene: &Scene,
+        anchor: DVec3,
+        watcher: &Watcher<'_>,
+    ) -> Result<Self, PackError> {
+        let [in_real, in_virtual] = [Side::Real, Side::Virtual].map(|side| triangles(scene, side));
+        let steps = (1 + STEPS_OF_A_TREE) * (in_real + in_virtual);
+        let meter = Meter::begin(watcher, Phase::Trees, steps);
         let mut packed = Self {
-            frame: bytemuck::Zeroable::zeroed(),
             anchor_m: anchor.to_array(),
-            real_bvh: WorldBvh::build(&[], 0)?,
-            virtual_bvh: WorldBvh::build(&[], 0)?,
-            triangles: Vec::new(),
-            vertices: Vec::new(),
-            materials: Vec::new(),
-            texture_refs: Vec::new(),
-            texels: Vec::new(),
-            lights: Vec::new(),
-            env_texels: Vec::new(),
-            env_cdf: Vec::new(),
-            photo_albedo: Vec::new(),
-            pixels: Vec::new(),
-            swept_spheres: Vec::new(),
-            material_table: MaterialTable::default(),
-            real_vertex_count: 0,
-            resting: Resting::default(),
-            resting_cover: Cover::of(&[], MAX_SPHERES),
-            env_mean_luminance: 0.0,
+            ..Self::empty()
         };
         packed.set_camera(scene);
         packed.set_settings(scene);
         packed.set_environment(scene);
         packed.add_world(scene, Side::Real)?;
+        meter.add(in_real);
         packed.real_bvh = WorldBvh::build(&packed.corners(0), 0)?;
         packed.frame.real_triangle_count = packed.triangles.len() as u32;
         packed.real_vertex_count = packed.vertices.len();
+        meter.add(STEPS_OF_A_TREE * in_real);
         packed.rebuild_virtual(scene)?;
+        meter.end();
         Ok(packed)
     }
 
@@ -381,6 +381,13 @@ impl PackedScene {
             .map(|t| t.vertices.map(|v| self.position(v)))
             .collect()
     }
+}
+
+/// How many the objects of one side have.
+fn triangles(scene: &Scene, side: Side) -> u64 {
+    let objects = scene.objects.iter().filter(|object| object.side == side);
+    let instances = objects.flat_map(|object| &object.instances);
+    instances.map(|i| i.primitive.triangles.len() as u64).sum()
 }
 
 fn set_rotation(frame: &mut Frame, rotation_deg: f64) {

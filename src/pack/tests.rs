@@ -1,5 +1,6 @@
 //! Packing against what the scene says, in f64.
 
+use crate::work::Watcher;
 use std::sync::Arc;
 
 use glam::{DMat4, DQuat, DVec3, Vec3};
@@ -41,7 +42,7 @@ fn quad(side: Side, x: f64) -> SceneLight {
 }
 
 fn pack(scene: &Scene) -> PackedScene {
-    PackedScene::build(scene).expect("packs")
+    PackedScene::build(scene, &Watcher::none()).expect("packs")
 }
 
 fn two_objects(offset: DVec3) -> Scene {

@@ -6,6 +6,7 @@
 pub(crate) mod materials;
 pub(crate) mod records;
 
+pub use materials::Material;
 pub use records::*;
 
 use crate::accel::{Cover, WorldBvh};
@@ -54,9 +55,8 @@ pub struct Resting {
     pub vertices: usize,
 }
 
-#[cfg(test)]
 impl PackedScene {
-    /// No geometry, no light: what unit tests of the shading fill in by hand.
+    /// No geometry, no light, at the origin.
     pub(crate) fn empty() -> Self {
         let world = || WorldBvh::build(&[], 0).expect("an empty world is legal");
         Self {

@@ -99,12 +99,12 @@ impl Renderer {
     }
 
     /// The shutter of the scene as it is now, and who drives it; true if what moves was packed anew.
-    pub(super) fn prepare_shutter(&mut self) -> Result<bool, RenderError> {
+    pub(super) fn prepare_shutter(&mut self, watcher: &Watcher<'_>) -> Result<bool, RenderError> {
         let core = &mut self.core;
         let instants = instants(&core.scene);
         let objects_move = !instants.is_empty();
         let swept = objects_move || matches!(self.driver, Driver::Moving(_));
-        core.packed.sweep(&mut core.scene, &instants)?;
+        core.packed.sweep(&mut core.scene, &instants, watcher)?;
         core.packed.set_shutter(&core.scene, objects_move);
         self.driver = match objects_move {
             true => Driver::Moving(Moving { instants }),

@@ -1,4 +1,6 @@
 //! YUV4MPEG2 streams, 8 bits a sample.
+//!
+//! By hand: a header line and raw planes, where a frame that is not rendered has to pass byte for byte, and errors say how to mend the stream.
 
 use std::io::Read;
 

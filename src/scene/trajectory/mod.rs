@@ -44,6 +44,9 @@ pub enum TrajectoryError {
     File { path: PathBuf, message: String },
 }
 
+/// What [`Trajectory::read`] tells apart, as the help of a command says it.
+pub const FORMATS: &str = ".toml or .json of this program, transforms.json of nerfstudio, COLMAP's text model (folder or images.txt), or a TUM trajectory";
+
 pub(super) type Result<T> = std::result::Result<T, TrajectoryError>;
 
 /// Pinhole intrinsics with OpenCV distortion, as [`super::Camera`] has them.

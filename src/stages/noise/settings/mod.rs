@@ -9,6 +9,7 @@ pub use profile::{
 
 use crate::refusal::Refusal;
 use crate::scene::error::Result;
+use crate::scene::fingerprint::{content, content_by_name};
 use crate::scene::reader::{Choice, Table};
 use crate::stages::table::{StageSettings, read_into};
 
@@ -77,6 +78,12 @@ impl NoiseSettings {
         }
     }
 }
+
+content! {
+    NoiseSettings { profile, method, scale, texture_size, magnification, update_delay_frames, eight_bit }
+}
+
+content_by_name! { NoiseMethod }
 
 impl StageSettings for NoiseSettings {
     const KEYS: &'static [&'static str] = &[

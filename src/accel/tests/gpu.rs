@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Hit, Ray, WorldBvh};
+use crate::accel::{Hit, Ray, WorldBvh};
 use crate::bench::stress::backend::traced_by_shader;
 use crate::bench::stress::meshes::*;
 use crate::gpu::harness::test_device;

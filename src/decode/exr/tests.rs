@@ -2,9 +2,10 @@
 
 use std::io::Cursor;
 
-use exr::prelude::*;
+use ::exr::prelude::*;
 
-use super::{ChannelFile, Pixels, decode_image};
+use super::ChannelFile;
+use crate::decode::{Pixels, decode_image};
 
 const WIDTH: usize = 4;
 const HEIGHT: usize = 3;

@@ -1,3 +1,5 @@
+mod gpu;
+
 use glam::Vec3;
 
 use super::kernel::Kernel;
