@@ -6,13 +6,13 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use super::camera::frame_camera;
 use super::lights::pack_lights;
-use crate::accel::{AccelError, WorldBvh};
+use crate::accel::{AccelError, Cover, WorldBvh};
 use crate::light::environment_table::environment_table;
 use crate::packed::materials::{MaterialKey, MaterialTable};
 use crate::packed::{
     ESTIMATOR_DIRECT, ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER,
     FRAME_SHUTTER_ORDERED, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE,
-    PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, SAMPLER_CMJ, SAMPLER_JITTERED,
+    PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, Resting, SAMPLER_CMJ, SAMPLER_JITTERED,
     SAMPLER_SOBOL, Triangle, Vertex,
 };
 use crate::scene::{
@@ -93,17 +93,46 @@ impl PackedScene {
         self.triangles.truncate(first as usize);
         self.vertices.truncate(self.real_vertex_count);
         self.add_world(scene, Side::Virtual)?;
-        self.virtual_bvh = WorldBvh::build(&self.corners(first as usize), first)?;
-        let spheres = self.virtual_bvh.bounding_spheres(MAX_SPHERES);
-        self.frame.sphere_count = spheres.len() as u32;
-        self.frame.spheres = [[0.0; 4]; MAX_SPHERES];
-        self.frame.spheres[..spheres.len()].copy_from_slice(&spheres);
+        self.resting = Resting {
+            triangles: self.triangles.len(),
+            vertices: self.vertices.len(),
+        };
+        let corners = self.corners(first as usize);
+        self.resting_cover = Cover::of(&corners, MAX_SPHERES);
+        self.virtual_bvh = WorldBvh::build(&corners, first)?;
+        self.rebuild_moving(scene)
+    }
+
+    /// Packs what moves of the virtual objects, and all lights, anew: the cost is that of the moving triangles, and of a look at every vertex.
+    ///
+    /// # Errors
+    /// As [`PackedScene::build`].
+    pub fn rebuild_moving(&mut self, scene: &Scene) -> Result<(), PackError> {
+        self.place_moving(scene)?;
+        let corners = self.corners(self.resting.triangles);
+        self.virtual_bvh.set_moving(&corners)?;
         let alpha = self
             .materials
             .iter()
             .any(|m| m.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0);
         self.frame.flags = self.frame.flags & !FRAME_ALPHA | if alpha { FRAME_ALPHA } else { 0 };
         pack_lights(self, scene);
+        Ok(())
+    }
+
+    /// Puts what moves where it is, and the spheres about it; its tree and the lights stay as they were.
+    ///
+    /// # Errors
+    /// As [`PackedScene::build`].
+    pub(super) fn place_moving(&mut self, scene: &Scene) -> Result<(), PackError> {
+        self.triangles.truncate(self.resting.triangles);
+        self.vertices.truncate(self.resting.vertices);
+        self.add_objects(scene, Side::Virtual, true)?;
+        let cover = Cover::of(&self.corners(self.resting.triangles), MAX_SPHERES);
+        let spheres = Cover::spheres(&[&self.resting_cover, &cover], MAX_SPHERES);
+        self.frame.sphere_count = spheres.len() as u32;
+        self.frame.spheres = [[0.0; 4]; MAX_SPHERES];
+        self.frame.spheres[..spheres.len()].copy_from_slice(&spheres);
         Ok(())
     }
 
@@ -182,23 +211,9 @@ impl PackedScene {
         }
     }
 
-    /// Appends the triangles of one side: its objects, then its quad lights.
+    /// Appends the triangles of one side that rest: its objects, then its quad lights.
     fn add_world(&mut self, scene: &Scene, side: Side) -> Result<(), PackError> {
-        for (index, object) in scene
-            .objects
-            .iter()
-            .enumerate()
-            .filter(|(_, o)| o.side == side)
-        {
-            for instance in &object.instances {
-                let material = self.add_material(
-                    &instance.material,
-                    object.self_shadow_bias_m,
-                    object.albedo_from_photo,
-                )?;
-                self.add_instance(&object.world_from_object, instance, material, index as u32);
-            }
-        }
+        self.add_objects(scene, side, false)?;
         for (index, light) in scene.lights.iter().enumerate() {
             if light.side != side {
                 continue;
@@ -226,6 +241,27 @@ impl PackedScene {
                 );
             }
         }
+        self.check_triangles()
+    }
+
+    /// Appends the parts of one side's objects that move, or those that rest.
+    fn add_objects(&mut self, scene: &Scene, side: Side, moving: bool) -> Result<(), PackError> {
+        let objects = (scene.objects.iter().enumerate()).filter(|(_, o)| o.side == side);
+        for (index, object) in objects {
+            let parts = object.instances.iter();
+            for instance in parts.filter(|instance| object.moves(instance) == moving) {
+                let material = self.add_material(
+                    &instance.material,
+                    object.self_shadow_bias_m,
+                    object.albedo_from_photo,
+                )?;
+                self.add_instance(&object.world_from_object, instance, material, index as u32);
+            }
+        }
+        self.check_triangles()
+    }
+
+    fn check_triangles(&self) -> Result<(), PackError> {
         let limit = (NONE / 8) as usize;
         if self.triangles.len() > limit {
             return Err(PackError::TooMany(self.triangles.len(), "triangles", limit));

@@ -52,7 +52,7 @@ impl PackedScene {
         }
     }
 
-    /// Finds what moving objects sweep over while the shutter is open, for the pilot. The virtual world is left at the picture's time.
+    /// Finds what moving objects sweep over while the shutter is open, for the pilot. No tree is built for it; the virtual world is left at the picture's time.
     ///
     /// # Errors
     /// As [`PackedScene::build`].
@@ -69,7 +69,7 @@ impl PackedScene {
         let meter = Meter::begin(watcher, Phase::Trees, instants.len() as u64);
         for instant in instants {
             scene.set_time(instant.time_secs);
-            self.rebuild_virtual(scene)?;
+            self.place_moving(scene)?;
             let count = self.frame.sphere_count as usize;
             self.swept_spheres
                 .extend_from_slice(&self.frame.spheres[..count]);
@@ -77,7 +77,7 @@ impl PackedScene {
         }
         if let Some(shutter) = scene.shutter {
             scene.set_time(shutter.time_secs);
-            self.rebuild_virtual(scene)?;
+            self.rebuild_moving(scene)?;
         }
         meter.end();
         Ok(())

@@ -1,7 +1,7 @@
 //! The scene as both backends read it: flat arrays of plain records, f32, positions relative to an anchor near the camera.
 //!
 //! The records are declared for both sides at once ([`records`], [`crate::shared`]).
-//! Triangle ids are global: real triangles come first (`0..Frame::real_triangle_count`), virtual ones after.
+//! Triangle ids are global: real triangles come first (`0..Frame::real_triangle_count`), then virtual ones that rest, then those that move.
 
 pub(crate) mod materials;
 pub(crate) mod records;
@@ -9,7 +9,7 @@ pub(crate) mod records;
 pub use materials::Material;
 pub use records::*;
 
-use crate::accel::WorldBvh;
+use crate::accel::{Cover, WorldBvh};
 pub use crate::shared::NONE;
 
 /// What a backend renders.
@@ -42,7 +42,17 @@ pub struct PackedScene {
     pub swept_spheres: Vec<[f32; 4]>,
     pub(crate) material_table: materials::MaterialTable,
     pub(crate) real_vertex_count: usize,
+    pub(crate) resting: Resting,
+    /// Over the virtual triangles that rest.
+    pub(crate) resting_cover: Cover,
     pub(crate) env_mean_luminance: f64,
+}
+
+/// How many of a scene's triangles and vertices rest: those of animated virtual objects come after them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Resting {
+    pub triangles: usize,
+    pub vertices: usize,
 }
 
 impl PackedScene {
@@ -67,6 +77,8 @@ impl PackedScene {
             swept_spheres: Vec::new(),
             material_table: materials::MaterialTable::default(),
             real_vertex_count: 0,
+            resting: Resting::default(),
+            resting_cover: Cover::of(&[], MAX_SPHERES),
             env_mean_luminance: 0.0,
         }
     }

@@ -50,6 +50,11 @@ impl Core {
         Ok(())
     }
 
+    /// Packs anew what moves.
+    pub fn pack_moving(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
+        packing(watcher, || self.packed.rebuild_moving(&self.scene))
+    }
+
     /// Takes the samples of a list. A device that is lost is replaced by the CPU, which takes what is left.
     pub fn take(&mut self, work: &WorkList, watcher: &Watcher<'_>) -> Result<(), RenderError> {
         if let Some(gpu) = self.backend.gpu_mut() {

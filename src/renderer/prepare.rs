@@ -27,7 +27,7 @@ impl Renderer {
         self.look_ahead(watcher);
         let core = &mut self.core;
         let changed = match changed {
-            Changed::View if swept => Changed::Virtual,
+            Changed::View if swept => Changed::Moving,
             changed => changed,
         };
         core.backend.update(&core.packed, changed)?;

@@ -17,7 +17,7 @@ mod photo;
 mod pose;
 pub mod projection;
 pub(crate) mod reader;
-mod sandbox;
+pub(crate) mod sandbox;
 mod scan;
 mod settings;
 pub(crate) mod shape;

@@ -182,6 +182,10 @@ impl<R: Read> Y4mReader<R> {
         &self.header
     }
 
+    pub(crate) fn place(&self) -> &Place {
+        &self.place
+    }
+
     /// The planes of the next frame, one after the other; `None` at the end of the stream.
     ///
     /// # Errors

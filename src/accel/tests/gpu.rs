@@ -120,6 +120,34 @@ fn the_shader_handles_worlds_without_triangles() {
     agree("one triangle", &mesh[..1], &mesh[1..2], &rays);
 }
 
+/// What moves is replaced under a tree that the shader knows, as part of a whole and alone.
+#[test]
+fn the_shader_hits_a_moving_part_as_if_all_were_one() {
+    let (rests, moves) = (soup(2000, 0.2, 9), soup(300, 0.3, 10));
+    let rays = rays_about(1.0, 4000, 11);
+    let real = WorldBvh::build(&rests, 0).expect("builds");
+    for resting in [&rests[..], &[]] {
+        let mut parts = WorldBvh::build(resting, 2000).expect("builds");
+        for moving in [&moves[..100], &[], &moves[..1], &moves[..]] {
+            parts.set_moving(moving).expect("builds");
+            let all = [resting, moving].concat();
+            let whole = WorldBvh::build(&all, 2000).expect("builds");
+            let traced = |world| shader_hits([&real, world], &rays, false);
+            let (Some(got), Some(expected)) = (traced(&parts), traced(&whole)) else {
+                return;
+            };
+            assert_eq!(got, expected);
+            let moved = |hit: &&Hit| hit.is_hit() && hit.triangle >= (2000 + resting.len()) as u32;
+            let moved = got.iter().filter(moved).count();
+            assert!(
+                (moved > 50) == (moving.len() > 50),
+                "{moved} of {}",
+                moving.len()
+            );
+        }
+    }
+}
+
 #[test]
 fn the_shader_refuses_rays_that_are_not_finite() {
     let world = WorldBvh::build(&soup(100, 2.0, 8), 0).expect("builds");
