@@ -52,7 +52,10 @@ impl Core {
 
     /// Packs anew what moves.
     pub fn pack_moving(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
-        packing(watcher, || self.packed.rebuild_moving(&self.scene))
+        let meter = Meter::begin(watcher, Phase::Trees, 1);
+        self.packed.rebuild_moving(&self.scene)?;
+        meter.end();
+        Ok(())
     }
 
     /// Takes the samples of a list. A device that is lost is replaced by the CPU, which takes what is left.
