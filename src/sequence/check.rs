@@ -245,6 +245,14 @@ fn read_points(path: &Path) -> Result<Vec<KnownPoint>, SequenceError> {
                 ),
             )),
         };
+        if frame.contains(char::is_control) {
+            return Err(failure(
+                line,
+                format!(
+                    "{frame:?} names no frame; expected its number or the name of its file; correct the line"
+                ),
+            ));
+        }
         let seen = match (x_px.is_empty(), y_px.is_empty()) {
             (true, true) => None,
             _ => Some([number(x_px)?, number(y_px)?]),
