@@ -1,7 +1,7 @@
 // The estimator as a state machine. Rust twin: src/cpu/estimator.rs, where the method is described.
 
 import package::gpu::buffers::{frame, pixels};
-import package::packed::records::{FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PIXEL_BEAM_MAY_MEET_VIRTUAL};
+import package::packed::records::{FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_SHARES};
 import package::shared::NONE;
 import package::material::bsdf::bsdf_albedo;
 import package::light::cones::{cone_pdf, cones_at};
@@ -22,6 +22,8 @@ import package::cpu::state::{
 };
 import package::material::surface::{Surface, surface_at};
 import package::accel::trace::Hit;
+import package::cpu::points::{end_capture, end_cone_capture};
+import package::cpu::sharing::tile_of;
 import package::cpu::vertex::shade_vertex;
 
 fn difference_turn(pixel: u32, index: u32) -> u32 {
@@ -33,7 +35,9 @@ fn difference_turn(pixel: u32, index: u32) -> u32 {
 }
 
 fn turn_offset(pixel: u32, period: u32) -> u32 {
-    return hash_u32(hash_combine(frame.seed ^ TURN_SALT, pixel)) % period;
+    var taking_turns = pixel;
+    if (pixels[pixel].flags & PIXEL_SHARES) != 0u { taking_turns = tile_of(frame.width, pixel); }
+    return hash_u32(hash_combine(frame.seed ^ TURN_SALT, taking_turns)) % period;
 }
 
 fn begin_sample(lane: u32, pixel: u32, index: u32, is_real_pass: bool) -> PathState {
@@ -190,6 +194,7 @@ fn resume(st: ptr<function, PathState>) {
         }
         if ((*st).path.pending & PENDING_REAL) != 0u {
             (*st).path.pending &= ~PENDING_REAL;
+            end_cone_capture(st);
             let real = path_reals[lane];
             (*st).path.mode = MODE_REAL;
             follow(st, real.segment);
@@ -200,6 +205,7 @@ fn resume(st: ptr<function, PathState>) {
         @if(!paper) {
             if ((*st).path.pending & PENDING_DIFFERENCE) != 0u {
                 (*st).path.pending &= ~PENDING_DIFFERENCE;
+                end_cone_capture(st);
                 (*st).path.mode = MODE_DIFFERENCE;
                 follow(st, path_differences[lane].segment);
                 (*st).path.indirect = 1u;
@@ -211,6 +217,7 @@ fn resume(st: ptr<function, PathState>) {
                 return;
             }
         }
+        end_capture(st);
         (*st).path.stage = STAGE_DONE;
         return;
     }

@@ -2,6 +2,7 @@
 
 import package::shared::NONE;
 import package::accel::trace::Hit;
+import package::cpu::sharing::LINKS;
 import package::work::rays::SampleRays;
 
 // The parts of the samples in flight, by lane.
@@ -14,6 +15,11 @@ import package::work::rays::SampleRays;
 @group(2) @binding(6) var<storage, read_write> path_results: array<PathResult>;
 @group(2) @binding(7) var<storage, read_write> path_radiances_real: array<vec3<f32>>;
 @group(2) @binding(8) var<storage, read_write> path_first_hits: array<FirstHit>;
+
+@group(2) @binding(9) var<storage, read_write> path_firsts: array<FirstVertex>;
+@group(2) @binding(10) var<storage, read_write> path_points: array<array<SharedPoint, POINTS>>;
+@group(2) @binding(11) var<storage, read_write> path_captures: array<Capture>;
+@group(2) @binding(12) var<storage, read_write> path_links: array<array<f32, LINKS>>;
 
 // What a step works on. It reads and writes the parts that are not here where they lie, at `lane`.
 struct PathState {

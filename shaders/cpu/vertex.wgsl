@@ -10,6 +10,7 @@ import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_
 import package::camera::sampler::{SampleSet, fourth, pair, second_pair, third};
 import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres};
 import package::cpu::contribution::{accumulate, density_weight, draw};
+import package::cpu::points::{keep_first_vertex, offer_point};
 import package::cpu::contribution::{
     SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
 };
@@ -68,12 +69,16 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
         select(reach, -reach, leaves_coinciding_real),
     );
     (*st).ray.side = side;
+    @if(sharing) { offer_point(st, s); }
 
     // Those of a path are played for certain.
     var techniques = Techniques(0.0, 1.0);
     @if(!paper) {
-        if difference { techniques = techniques_at(st, s, wo); }
+        if difference {
+            techniques = techniques_at(st, s, wo);
+        }
     }
+    @if(sharing) { keep_first_vertex(st, s, techniques.cone_probability, techniques.bsdf_probability); }
     next_event(st, s, wo, techniques);
     if lights_suffice(st, s) { return; }
     @if(!paper) {
@@ -101,7 +106,8 @@ fn techniques_at(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>) -> Tec
     if (frame.flags & FRAME_NO_CONES) != 0u { return Techniques(0.0, 1.0); }
     let strength = max_element(abs((*st).path.throughput * bsdf_albedo(s, wo)));
     let reach = cone_solid_angle_fraction(cones_at(s.position, s.ns));
-    let cone_probability = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0);
+    var cone_probability = 0.0;
+    if frame.sphere_count > 0u { cone_probability = clamp(CONE_ROULETTE_GAIN * strength * reach, CONE_ROULETTE_FLOOR, 1.0); }
     var bsdf_probability = 1.0;
     if bsdf_is_lambertian(s) {
         bsdf_probability = clamp(RECURSION_ROULETTE_GAIN * strength, RECURSION_ROULETTE_FLOOR, 1.0);
@@ -200,7 +206,7 @@ fn plays(u: SampleSet, probability: f32) -> bool {
 
 fn plan_cone(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques) {
     let u = draw(st, SET_DIFFERENCE_CONE);
-    if frame.sphere_count == 0u || !plays(u, techniques.cone_probability) { return; }
+    if !plays(u, techniques.cone_probability) { return; }
     let c = cone_sample(cones_at(s.position, s.ns), third(u), pair(u));
     if c.pdf <= 0.0 { return; }
     let f = bsdf_eval(s, wo, c.direction);

@@ -12,9 +12,10 @@ import package::gpu::lanes::{
 import package::cpu::request::answer;
 import package::work::rays::SampleRays;
 import package::cpu::state::{
-    FAR, PathResult, PathState, REQUEST_CLOSEST_REAL, STAGE_DONE, path_first_hits, path_hits, path_radiances_real, path_rays,
-    path_results, paths,
+    FAR, FIRST_NONE, PathResult, PathState, REQUEST_CLOSEST_REAL, STAGE_DONE, path_first_hits, path_hits, path_radiances_real, path_rays,
+    path_results, path_state, paths, POINTS, POINT_NONE, path_captures, path_firsts, path_points,
 };
+import package::cpu::sharing::{gather, link_points};
 
 @compute @workgroup_size(WORKGROUP)
 fn kernel_generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
@@ -22,6 +23,13 @@ fn kernel_generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_
     var alive = false;
     var rays: SampleRays;
     if lane < batch.lane_count {
+        @if(sharing) {
+            path_firsts[lane].kept = FIRST_NONE;
+            path_firsts[lane].cone_probability = 0.0;
+            path_firsts[lane].bsdf_probability = 0.0;
+            for (var kind = 0u; kind < POINTS; kind++) { path_points[lane][kind].strength = 0.0; }
+            path_captures[lane].point = POINT_NONE;
+        }
         let item = work[lane % batch.pixel_count];
         let index = item.first + batch.sample_offset + lane / batch.pixel_count;
         if index < item.end {
@@ -93,6 +101,18 @@ fn kernel_advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_i
     append(st.lane, alive, thread);
 }
 
+// Once all samples are at their end: second vertices go to others of their tiles.
+@compute @workgroup_size(WORKGROUP)
+fn kernel_share(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    var st = path_state(id.x, 0u, 0u);
+    @if(sharing) {
+        if id.x < batch.lane_count && path_firsts[id.x].kept != FIRST_NONE {
+            link_points(&st, thread);
+        }
+    }
+    add_rays(st.rays, thread);
+}
+
 // One thread sums all samples of one pixel, in their order.
 @compute @workgroup_size(WORKGROUP)
 fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -109,7 +129,11 @@ fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>) {
             let lane = k * batch.pixel_count + slot;
             let result = path_results[lane];
             let is_virtual = result.mask != 0u;
-            let radiance = result.radiance * frame.exposure_scale;
+            var found = result.radiance;
+            @if(sharing) {
+                if batch.real_pass == 0u && path_firsts[lane].kept != FIRST_NONE { found += gather(lane); }
+            }
+            let radiance = found * frame.exposure_scale;
             if batch.real_pass != 0u {
                 sums = pixel_add_real(sums, index, is_virtual, radiance, zero);
             } else {

@@ -20,7 +20,7 @@ fn bsdf_eval(s: Surface, wo: vec3<f32>, wi: vec3<f32>) -> BsdfEval {
             return lobes_eval(s, wo, wi);
         }
     }
-    let pdf = lambert_cos(s, wi) * INV_PI;
+    let pdf = lambert_cos(s.ng, s.ns, wi) * INV_PI;
     return BsdfEval(s.base_color * pdf, pdf);
 }
 
@@ -34,7 +34,7 @@ fn bsdf_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
         }
     }
     let wi = sample_lambert(s, u.y, u.z);
-    let pdf = lambert_cos(s, wi) * INV_PI;
+    let pdf = lambert_cos(s.ng, s.ns, wi) * INV_PI;
     if pdf <= 0.0 {
         return SAMPLE_NOTHING;
     }

@@ -87,7 +87,7 @@ fn eval_reflection(s: Surface, lobes: Lobes, wo: vec3<f32>, wi: vec3<f32>) -> Bs
     if lobes.p_diffuse > 0.0 {
         let sum = wo + wi;
         let cos_half = 0.5 * sqrt(dot3(sum, sum));
-        let cosine = lambert_cos(s, wi) * INV_PI;
+        let cosine = lambert_cos(s.ng, s.ns, wi) * INV_PI;
         let passed = 1.0 - max3(opaque_fresnel(s, cos_half));
         f_cos += diffuse_color(s) * (under * passed * cosine);
         pdf += lobes.p_diffuse * cosine;

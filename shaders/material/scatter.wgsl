@@ -28,13 +28,13 @@ fn delta_sample(wi: vec3<f32>, weight: vec3<f32>, transmitted: bool) -> BsdfSamp
     return BsdfSample(wi, weight, 0.0, true, transmitted, true);
 }
 
-fn lambert_cos(s: Surface, wi: vec3<f32>) -> f32 {
-    let height = dot3(s.ng, wi);
+fn lambert_cos(ng: vec3<f32>, ns: vec3<f32>, wi: vec3<f32>) -> f32 {
+    let height = dot3(ng, wi);
     if height <= 0.0 {
         return 0.0;
     }
-    let direct = dot3(s.ns, wi);
-    let mirrored = direct - 2.0 * height * dot3(s.ng, s.ns);
+    let direct = dot3(ns, wi);
+    let mirrored = direct - 2.0 * height * dot3(ng, ns);
     return max(direct, 0.0) + max(mirrored, 0.0);
 }
 

@@ -31,7 +31,7 @@ impl GpuTime {
     /// What neither a kernel nor a named step of the host took: submission, waiting, moving sums.
     fn rest_secs(&self) -> f64 {
         let k = &self.kernels;
-        let kernels = k.trace + k.advance + k.generate + k.turn + k.accumulate;
+        let kernels = k.trace + k.advance + k.generate + k.turn + k.share + k.accumulate;
         (self.wall_secs - self.setup_secs - self.composite_secs - kernels).max(0.0)
     }
 
@@ -77,7 +77,7 @@ pub fn gpu_time(scene: &Scene, rays_per_pixel: u32) -> Result<Option<GpuTime>, R
     }))
 }
 
-const HEADS: [&str; 11] = [
+const HEADS: [&str; 12] = [
     "scene",
     "rays/px",
     "wall s",
@@ -86,6 +86,7 @@ const HEADS: [&str; 11] = [
     "both",
     "generate",
     "queue",
+    "share",
     "sum",
     "pilot, upload, composite",
     "rest",
@@ -103,6 +104,7 @@ fn cells(time: &GpuTime) -> Vec<String> {
         format!("{:.1}%", 100.0 * time.tracing_share()),
         share(k.generate),
         share(k.turn),
+        share(k.share),
         share(k.accumulate),
         share(time.setup_secs + time.composite_secs),
         share(time.rest_secs()),
@@ -156,7 +158,8 @@ mod tests {
                 turn: 0.02,
                 trace: 0.8,
                 advance: 0.6,
-                accumulate: 0.08,
+                accumulate: 0.07,
+                share: 0.01,
             },
         };
         assert!((time.rest_secs() - 0.2).abs() < 1e-12);

@@ -5,8 +5,12 @@
 
 use super::estimator::{advance, begin_sample};
 use super::request::answer;
-use super::state::{PathState, STAGE_COUNT, STAGE_DONE};
+use super::sharing::{
+    LINKS, MEMBERS, Member, TILE_STRIDE, gather, link_points, member_of, tile_of,
+};
+use super::state::{FIRST_NONE, PathState, STAGE_COUNT, STAGE_DONE, path_state};
 use crate::packed::PackedScene;
+use crate::work::SampleRays;
 
 /// Places of samples in a batch, by the stage that they are in.
 type Queues = [Vec<u16>; STAGE_COUNT as usize];
@@ -20,12 +24,13 @@ pub fn run_alone(scene: &PackedScene, state: &mut PathState) {
 }
 
 /// Samples in flight.
-#[derive(Default)]
 pub struct Batch {
     samples: Vec<InFlight>,
     waiting: Queues,
     /// Empty between two steps.
     advanced: Queues,
+    /// Traces for what samples share.
+    probe: PathState,
 }
 
 /// One of them.
@@ -33,6 +38,17 @@ pub struct InFlight {
     /// Among the pixel's samples: not [`super::state::Path::index`] where the pixel's differences take turns.
     pub index: u32,
     pub state: PathState,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self {
+            samples: Vec::new(),
+            waiting: Queues::default(),
+            advanced: Queues::default(),
+            probe: path_state(0, 0),
+        }
+    }
 }
 
 impl Batch {
@@ -57,6 +73,7 @@ impl Batch {
         while self.waiting.iter().any(|queue| !queue.is_empty()) {
             self.step(scene);
         }
+        self.share(scene);
     }
 
     /// One ray of each sample that is not done, and what follows from it.
@@ -75,6 +92,41 @@ impl Batch {
             }
         }
         std::mem::swap(&mut self.waiting, &mut self.advanced);
+    }
+
+    /// Shares second vertices between the samples of equal number in a tile. Samples of one number stand together, in
+    /// ascending order of pixels.
+    fn share(&mut self, scene: &PackedScene) {
+        let width = scene.frame.width;
+        let probe = &mut self.probe;
+        let mut tiles = [const { Vec::new() }; (TILE_STRIDE * TILE_STRIDE) as usize];
+        for samples in self.samples.chunk_by_mut(|a, b| a.index == b.index) {
+            for (slot, sample) in samples.iter().enumerate() {
+                let state = &sample.state;
+                if state.first.kept != FIRST_NONE {
+                    let pixel = state.path.pixel;
+                    let number = member_of(width, pixel);
+                    let tile = tile_of(width, pixel) % (TILE_STRIDE * TILE_STRIDE);
+                    tiles[tile as usize].push(Member { slot, number });
+                }
+            }
+            for members in &mut tiles {
+                let mut links = [[0.0; LINKS as usize]; MEMBERS as usize];
+                for (links, &from) in links.iter_mut().zip(members.iter()) {
+                    *links = link_points(scene, samples, members, from, probe);
+                }
+                for &to in members.iter() {
+                    let light = gather(samples, members, &links, to);
+                    samples[to.slot].state.result.radiance += light;
+                }
+                members.clear();
+            }
+        }
+    }
+
+    /// Rays that were traced for samples in common, since the last time.
+    pub fn take_shared_rays(&mut self) -> SampleRays {
+        std::mem::take(&mut self.probe.rays)
     }
 
     /// In the order in which they were begun.

@@ -7,6 +7,8 @@
 use glam::Vec3;
 
 use super::contribution::*;
+use super::points::{end_capture, end_cone_capture};
+use super::sharing::tile_of;
 use super::state::*;
 use super::vertex::shade_vertex;
 use crate::accel::Hit;
@@ -20,7 +22,7 @@ use crate::material::{Surface, bsdf_albedo, surface_at};
 use crate::math::{hash_combine, hash_u32};
 use crate::packed::{
     ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, NONE,
-    PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene,
+    PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_SHARES, PackedScene,
 };
 use crate::shared::shared;
 
@@ -30,7 +32,7 @@ shared! {
 }
 
 /// The difference is evaluated in turns: at one sample in every `difference_period`, from a random offset of the pixel's own, so that each
-/// sample has the same chance. The number of the turn, or NONE if this sample has none.
+/// sample has the same chance; pixels that share take turns together. The number of the turn, or NONE if this sample has none.
 pub fn difference_turn(scene: &PackedScene, pixel: u32, index: u32) -> u32 {
     let period = scene.pixels[pixel as usize].difference_period;
     if period <= 1 {
@@ -45,7 +47,13 @@ pub fn difference_turn(scene: &PackedScene, pixel: u32, index: u32) -> u32 {
 }
 
 fn turn_offset(scene: &PackedScene, pixel: u32, period: u32) -> u32 {
-    hash_u32(hash_combine(scene.frame.seed ^ TURN_SALT, pixel)) % period
+    let shares = scene.pixels[pixel as usize].flags & PIXEL_SHARES != 0;
+    let taking_turns = if shares {
+        tile_of(scene.frame.width, pixel)
+    } else {
+        pixel
+    };
+    hash_u32(hash_combine(scene.frame.seed ^ TURN_SALT, taking_turns)) % period
 }
 
 /// Whether the sample is known to add nothing before its ray is even made.
@@ -235,6 +243,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
         }
         if st.path.pending & PENDING_REAL != 0 {
             st.path.pending &= !PENDING_REAL;
+            end_cone_capture(st);
             st.path.mode = MODE_REAL;
             follow(st, st.real.segment);
             st.ray.depth = st.path.real_depth;
@@ -243,6 +252,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
         }
         if st.path.pending & PENDING_DIFFERENCE != 0 {
             st.path.pending &= !PENDING_DIFFERENCE;
+            end_cone_capture(st);
             st.path.mode = MODE_DIFFERENCE;
             follow(st, st.difference.segment);
             st.path.indirect = 1;
@@ -253,6 +263,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.ray.request = st.difference.request;
             return;
         }
+        end_capture(st);
         st.path.stage = STAGE_DONE;
         return;
     }

@@ -62,6 +62,7 @@ fn render_block(
         }
         if batch.len() >= Batch::WORTH || index + 1 == end {
             batch.run(scene);
+            rays += RayCounts::from(batch.take_shared_rays());
             for sample in batch.samples() {
                 rays += sample.state.rays;
                 add_sample(scene, tile, pass, sample);

@@ -81,6 +81,20 @@ shared! {
     /// The shaders' infinity, for which WGSL has no literal; misses carry it.
     const FAR: f32 = f32::MAX;
 
+    /// What a kept first vertex estimates: there is none; the difference, at a real one; the mixed radiance of a virtual one.
+    pub const FIRST_NONE: u32 = 0;
+    pub const FIRST_DIFFERENCE: u32 = 1;
+    pub const FIRST_VIRTUAL: u32 = 2;
+
+    /// Where the BSDF's direction leads: a difference leaves it, or towards a virtual vertex mixed radiance.
+    pub const POINT_RECURSION: u32 = 0;
+    /// Virtual geometry that a direction inside the cones has met, and the real surface behind it.
+    pub const POINT_COVERING: u32 = 1;
+    pub const POINT_COVERED: u32 = 2;
+    pub const POINTS: u32 = 3;
+    /// Nothing is captured.
+    pub const POINT_NONE: u32 = 3;
+
     /// A virtual hit counts as nearer within this relative distance, so that a base lying in the table's plane covers the table.
     pub const COINCIDENCE: f32 = 1e-5;
 
@@ -194,6 +208,48 @@ shared! {
         pub mask: u32,
     }
 
+    /// The first vertex of a sample that shares: a Lambertian one.
+    #[derive(Clone, Copy, Debug)]
+    pub struct FirstVertex {
+        pub origin: RayOrigin,
+        /// Unit geometric normal, on the side that the ray came from.
+        pub ng: Vec3,
+        /// Roulette probability of the cones; 0: no directions are drawn inside of them.
+        pub cone_probability: f32,
+        /// Unit shading normal.
+        pub ns: Vec3,
+        /// Roulette probability of the recursion; 0: there is none.
+        pub bsdf_probability: f32,
+        /// Albedo times the samples that this one stands for.
+        pub throughput: Vec3,
+        /// `FIRST_*`.
+        pub kept: u32,
+    }
+
+    /// A second vertex, whose light other first vertices may use.
+    #[derive(Clone, Copy, Debug)]
+    pub struct SharedPoint {
+        pub position: Vec3,
+        /// Bound on the error of `position`, metres.
+        pub error: f32,
+        /// Unit geometric normal, on the side that the ray came from.
+        pub ng: Vec3,
+        /// Largest channel of the path's throughput where it was met; 0: there is no such point.
+        pub strength: f32,
+        /// What leaves the point towards any other: the difference, the mixed radiance, or the real one.
+        pub radiance: Vec3,
+        pub pad: u32,
+    }
+
+    /// What is found goes to a shared point for the while.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Capture {
+        /// What the sample had found before.
+        pub own: Vec3,
+        /// `POINT_*`.
+        pub point: u32,
+    }
+
     /// The first surface met.
     #[derive(Clone, Copy, Debug)]
     pub struct FirstHit {
@@ -219,6 +275,10 @@ pub struct PathState {
     /// Paper: real radiance.
     pub radiance_real: Vec3,
     pub first_hit: FirstHit,
+    pub first: FirstVertex,
+    /// By `POINT_*`.
+    pub points: [SharedPoint; POINTS as usize],
+    pub capture: Capture,
     /// The vertex to be shaded next.
     pub vertex_hit: Hit,
     pub rays: SampleRays,
@@ -239,6 +299,25 @@ const NO_SEGMENT: Segment = Segment {
     density: 0.0,
     throughput: Vec3::ZERO,
     medium: NONE,
+};
+
+const NO_FIRST_VERTEX: FirstVertex = FirstVertex {
+    origin: NO_ORIGIN,
+    ng: Vec3::ZERO,
+    cone_probability: 0.0,
+    ns: Vec3::ZERO,
+    bsdf_probability: 0.0,
+    throughput: Vec3::ZERO,
+    kept: FIRST_NONE,
+};
+
+const NO_POINT: SharedPoint = SharedPoint {
+    position: Vec3::ZERO,
+    error: 0.0,
+    ng: Vec3::ZERO,
+    strength: 0.0,
+    radiance: Vec3::ZERO,
+    pad: 0,
 };
 
 /// A sample that has not begun.
@@ -295,6 +374,12 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
             depth_m: f32::INFINITY,
             albedo: Vec3::ZERO,
             pad: 0,
+        },
+        first: NO_FIRST_VERTEX,
+        points: [NO_POINT; POINTS as usize],
+        capture: Capture {
+            own: Vec3::ZERO,
+            point: POINT_NONE,
         },
         vertex_hit: MISS,
         rays: SampleRays::default(),

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::contribution::*;
+use super::points::{keep_first_vertex, offer_point};
 use super::state::*;
 use crate::camera::sampler::SampleSet;
 use crate::light::blocking::light_may_be_blocked;
@@ -33,8 +34,8 @@ shared! {
     const RECURSION_ROULETTE_GAIN: f32 = 1.0;
     const RECURSION_ROULETTE_FLOOR: f32 = 0.1;
     /// A light's own surface must not block it: shadow rays end this much short of it, relative to the distance and in position errors.
-    const SHADOW_SHORTEN: f32 = 2e-5;
-    const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
+    pub const SHADOW_SHORTEN: f32 = 2e-5;
+    pub const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
     /// Surfaces that scatter nothing.
     const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
@@ -94,8 +95,14 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
         },
     };
     st.ray.side = side;
+    offer_point(scene, st, s);
 
     let techniques = difference.then(|| techniques_at(scene, st, s, wo));
+    // The directions of a path are drawn for certain.
+    let (cones, bsdf) = techniques
+        .as_ref()
+        .map_or((0.0, 1.0), |t| (t.cone_probability, t.bsdf_probability));
+    keep_first_vertex(scene, st, s, cones, bsdf);
     next_event(scene, st, s, wo, techniques.as_ref());
     if lights_suffice(scene, st, s) {
         return;
@@ -133,7 +140,10 @@ fn techniques_at(scene: &PackedScene, st: &PathState, s: &Surface, wo: Vec3) -> 
         .abs()
         .max_element();
     let reach = cone_solid_angle_fraction(&cones);
-    let cone_probability = (CONE_ROULETTE_GAIN * strength * reach).clamp(CONE_ROULETTE_FLOOR, 1.0);
+    let mut cone_probability = 0.0;
+    if scene.frame.sphere_count > 0 {
+        cone_probability = (CONE_ROULETTE_GAIN * strength * reach).clamp(CONE_ROULETTE_FLOOR, 1.0);
+    }
     let mut bsdf_probability = 1.0;
     if bsdf_is_lambertian(s) {
         bsdf_probability =
@@ -281,7 +291,7 @@ fn plan_cone(
     techniques: &Techniques,
 ) {
     let u = draw(scene, st, SET_DIFFERENCE_CONE);
-    if scene.frame.sphere_count == 0 || !plays(&u, techniques.cone_probability) {
+    if !plays(&u, techniques.cone_probability) {
         return;
     }
     let c = cone_sample(&techniques.cones, u.third(), u.pair());

@@ -334,7 +334,7 @@ mod tests {
         let wgsl = Composer::default().with_module("root", root).compose(
             "root",
             "main",
-            &Features::all(),
+            &Features::ALL,
         )?;
         let bindings = reflect_bindings(&wgsl).expect("valid");
         Ok(bindings.into_iter().map(|binding| binding.name).collect())

@@ -39,9 +39,7 @@ macro_rules! features {
             }
 
             /// Everything on: the largest variant.
-            pub fn all() -> Self {
-                Self { $($name: true,)* }
-            }
+            pub const ALL: Self = Self { $($name: true,)* };
         }
     };
 }
@@ -72,6 +70,8 @@ features! {
     rough_specular,
     /// The camera moves while the shutter is open.
     shutter,
+    /// Second vertices are shared between pixels.
+    sharing,
 }
 
 impl Features {
@@ -83,7 +83,8 @@ impl Features {
         }
         Self {
             paper: needed.paper,
-            ..Self::all()
+            sharing: !needed.paper,
+            ..Self::ALL
         }
     }
 
@@ -115,6 +116,7 @@ impl Features {
             paper: scene.frame.estimator == packed::ESTIMATOR_PAPER,
             rough_specular: material(&|m| m.flags & no_lobe == 0),
             shutter: scene.frame.flags & packed::FRAME_SHUTTER != 0,
+            sharing: (scene.pixels.iter()).any(|info| info.flags & packed::PIXEL_SHARES != 0),
         }
     }
 }
@@ -165,6 +167,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &cpu::contribution::SHARED,
     &cpu::estimator::SHARED,
     &cpu::request::SHARED,
+    &cpu::sharing::SHARED,
     &cpu::state::SHARED,
     &cpu::vertex::SHARED,
 ];

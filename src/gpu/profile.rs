@@ -5,18 +5,20 @@ use serde::Serialize;
 use super::{GpuDevice, GpuError};
 
 /// Kernels of the wavefront, in the order of [`KernelSeconds`].
-pub const KERNELS: [&str; 5] = [
+pub const KERNELS: [&str; 6] = [
     "kernel_generate",
     "kernel_turn",
     "kernel_trace",
     "kernel_advance",
     "kernel_accumulate",
+    "kernel_share",
 ];
 pub const GENERATE: usize = 0;
 pub const TURN: usize = 1;
 pub const TRACE: usize = 2;
 pub const ADVANCE: usize = 3;
 pub const ACCUMULATE: usize = 4;
+pub const SHARE: usize = 5;
 
 /// Seconds on the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -26,6 +28,7 @@ pub struct KernelSeconds {
     pub trace: f64,
     pub advance: f64,
     pub accumulate: f64,
+    pub share: f64,
 }
 
 impl KernelSeconds {
@@ -35,7 +38,8 @@ impl KernelSeconds {
             TURN => &mut self.turn,
             TRACE => &mut self.trace,
             ADVANCE => &mut self.advance,
-            _ => &mut self.accumulate,
+            ACCUMULATE => &mut self.accumulate,
+            _ => &mut self.share,
         };
         *field += secs;
     }

@@ -1,6 +1,7 @@
 //! Runs samples as a wavefront: a batch of them advances one step a dispatch, the finished ones leave the queue, and at the end one
 //! thread a pixel adds the samples to the pixel's sums in their order. What reaches the film does not depend on how the work was cut.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
@@ -9,11 +10,14 @@ use super::kernel::{BindGroups, Kernel};
 use super::lanes::{Batch, Counters, Lanes, most_lanes, state_parts};
 use super::pacer::Pacer;
 use super::profile::{
-    ACCUMULATE, ADVANCE, GENERATE, KERNELS, KernelSeconds, Profiler, TRACE, TURN,
+    ACCUMULATE, ADVANCE, GENERATE, KERNELS, KernelSeconds, Profiler, SHARE, TRACE, TURN,
 };
 use super::{Changed, Composer, Features, GpuDevice, GpuError, SceneBuffers, SceneParts};
+use crate::cpu::sharing::tile_of;
 use crate::film::Film;
 use crate::packed::PackedScene;
+use crate::shared::WORKGROUP;
+use crate::work::list::TILE_PLACES;
 use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
 
 /// Samples of one pixel in a batch at most, so that a batch has pixels enough to sum in parallel.
@@ -216,9 +220,17 @@ impl GpuBackend {
         rays: &mut RayCounts,
         watcher: &Watcher<'_>,
     ) -> Result<(), GpuError> {
-        // Pixels that share a batch take equally many samples of it: no lanes stay empty.
+        // Pixels that share a batch take equally many samples of it: no lanes stay empty. Those of a sharing tile lie together.
         let mut pixels = work.pixels.clone();
-        pixels.sort_by_key(|pixel| std::cmp::Reverse(pixel.samples()));
+        let tile = |work: &PixelWork| tile_of(film.width, work.pixel);
+        pixels.sort_by_key(|work| (Reverse(work.samples()), tile(work), work.pixel));
+        for members in pixels.chunk_by_mut(|a, b| a.samples() == b.samples() && tile(a) == tile(b))
+        {
+            let count = members.len() as u32;
+            for (place, work) in (0..).zip(members) {
+                work.tile = place + TILE_PLACES * count;
+            }
+        }
         let mut rest = pixels.as_slice();
         while !rest.is_empty() && !watcher.is_cancelled() {
             let lanes = self.pacer.lanes();
@@ -337,7 +349,7 @@ impl GpuBackend {
         let mut dispatches = vec![Dispatch {
             kernel: GENERATE,
             parity: 1,
-            workgroups: Some(batch.lane_count.div_ceil(64)),
+            workgroups: Some(batch.lane_count.div_ceil(WORKGROUP)),
         }];
         let mut alive = batch.lane_count;
         let mut steps_before = 0;
@@ -388,14 +400,16 @@ impl GpuBackend {
         work: &[PixelWork],
         last: bool,
     ) -> Result<Counters, GpuError> {
-        let mut encoder = self.encode(
-            lanes,
-            &[Dispatch {
-                kernel: ACCUMULATE,
-                parity: 0,
-                workgroups: Some(batch.pixel_count.div_ceil(64)),
-            }],
-        );
+        let once = |kernel, count: u32| Dispatch {
+            kernel,
+            parity: 0,
+            workgroups: Some(count.div_ceil(WORKGROUP)),
+        };
+        let mut dispatches = vec![once(ACCUMULATE, batch.pixel_count)];
+        if self.features.sharing && batch.real_pass == 0 {
+            dispatches.insert(0, once(SHARE, batch.lane_count));
+        }
+        let mut encoder = self.encode(lanes, &dispatches);
         lanes.copy_counters(&mut encoder);
         if !last {
             self.submit(encoder)?;
@@ -470,14 +484,22 @@ impl GpuBackend {
     }
 }
 
-/// How many of the first pixels of `work` take their samples, or [`MOST_SAMPLES`] of them, in one batch of `lanes`; at least one.
+/// How many of the first pixels of `work` take their samples, or [`MOST_SAMPLES`] of them, in one batch of `lanes`; whole tiles, at least one.
 fn pixels_that_fit(work: &[PixelWork], lanes: usize) -> usize {
     let mut longest = 1;
-    work.iter()
-        .enumerate()
-        .position(|(before, pixel)| {
-            longest = longest.max(pixel.samples().min(MOST_SAMPLES) as usize);
-            (before + 1) * longest > lanes
-        })
-        .map_or(work.len(), |fitting| fitting.max(1))
+    let fitting = work.iter().enumerate().position(|(before, pixel)| {
+        longest = longest.max(pixel.samples().min(MOST_SAMPLES) as usize);
+        (before + 1) * longest > lanes
+    });
+    let Some(fitting) = fitting else {
+        return work.len();
+    };
+    let (place, count) = (
+        work[fitting].tile % TILE_PLACES,
+        work[fitting].tile / TILE_PLACES,
+    );
+    match fitting - place as usize {
+        0 => (count as usize).max(1),
+        whole_tiles => whole_tiles,
+    }
 }

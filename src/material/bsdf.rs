@@ -21,7 +21,7 @@ pub fn bsdf_eval(s: &Surface, wo: Vec3, wi: Vec3) -> BsdfEval {
         return EVAL_NOTHING;
     }
     if bsdf_is_lambertian(s) {
-        let pdf = lambert_cos(s, wi) * INV_PI;
+        let pdf = lambert_cos(s.ng, s.ns, wi) * INV_PI;
         return BsdfEval {
             f_cos: s.base_color * pdf,
             pdf,
@@ -39,7 +39,7 @@ pub fn bsdf_sample(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
         return lobes_sample(s, wo, u);
     }
     let wi = sample_lambert(s, u[1], u[2]);
-    let pdf = lambert_cos(s, wi) * INV_PI;
+    let pdf = lambert_cos(s.ng, s.ns, wi) * INV_PI;
     if pdf <= 0.0 {
         return SAMPLE_NOTHING;
     }

@@ -128,7 +128,7 @@ fn eval_reflection(s: &Surface, lobes: &Lobes, wo: Vec3, wi: Vec3) -> BsdfEval {
     if lobes.p_diffuse > 0.0 {
         let sum = wo + wi;
         let cos_half = 0.5 * sum.dot(sum).sqrt();
-        let cosine = lambert_cos(s, wi) * INV_PI;
+        let cosine = lambert_cos(s.ng, s.ns, wi) * INV_PI;
         let passed = 1.0 - max3(opaque_fresnel(s, cos_half));
         f_cos += diffuse_color(s) * (under * passed * cosine);
         pdf += lobes.p_diffuse * cosine;

@@ -84,13 +84,13 @@ pub fn delta_sample(wi: Vec3, weight: Vec3, transmitted: bool) -> BsdfSample {
 
 /// Cosine of Lambert's law for a shading normal that differs from the geometric one: directions of the shading hemisphere that lie
 /// under the surface are mirrored up at it, so that no energy is lost and a white Lambertian mesh reflects all light.
-pub fn lambert_cos(s: &Surface, wi: Vec3) -> f32 {
-    let height = s.ng.dot(wi);
+pub fn lambert_cos(ng: Vec3, ns: Vec3, wi: Vec3) -> f32 {
+    let height = ng.dot(wi);
     if height <= 0.0 {
         return 0.0;
     }
-    let direct = s.ns.dot(wi);
-    let mirrored = direct - 2.0 * height * s.ng.dot(s.ns);
+    let direct = ns.dot(wi);
+    let mirrored = direct - 2.0 * height * ng.dot(ns);
     direct.max(0.0) + mirrored.max(0.0)
 }
 

@@ -108,6 +108,8 @@ shared! {
     pub const FRAME_NO_CONES: u32 = 128;
     /// Without the saving `last-vertex`: every last vertex looks for light, as if `FRAME_LIGHTS_SUFFICE` were not.
     pub const FRAME_NO_LAST_VERTEX: u32 = 256;
+    /// Without the saving `sharing`. No shader reads it.
+    pub const FRAME_NO_SHARING: u32 = 512;
 
     #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
     pub struct Vertex {
@@ -213,6 +215,12 @@ shared! {
     /// The pixel is known to be an edge: every sample's real radiance is wanted, even where the film has met one world alone. For backends'
     /// hosts; no shader reads it.
     pub const PIXEL_EDGE: u32 = 4;
+
+    /// The pixel's samples share their second vertices with those of its sharing tile, whose pixels have one plan.
+    pub const PIXEL_SHARES: u32 = 8;
+    /// Its samples share, and some pixel of the sharing block may meet virtual geometry: all of them take the samples that this one needs. No
+    /// shader reads it.
+    pub const PIXEL_SHARES_NEAR: u32 = 16;
 
     /// What the pilot found out about a pixel before any sample is taken.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]

@@ -2,8 +2,8 @@
 
 use super::ErrorGoal;
 use crate::packed::{
-    FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL,
-    PIXEL_OUT_OF_REACH, PixelInfo,
+    FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, FRAME_NO_SHARING, Frame,
+    PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PixelInfo,
 };
 use crate::scene::{Choice, Estimator};
 
@@ -24,6 +24,8 @@ pub enum Skip {
     /// Directions inside the cones of the virtual bounding spheres; without them the BSDF's alone find virtual objects. The expectation is the
     /// same.
     Cones,
+    /// Samples of neighbouring pixels use each other's second vertices. The expectation is the same.
+    Sharing,
     /// Where a few lights are all the light there is, a diffuse last vertex leaves all to its shadow ray. The expectation is the same.
     LastVertex,
     /// Shaders hold the code that the scene needs and no more (GPU). The result is the same to rounding.
@@ -43,6 +45,7 @@ impl Choice for Skip {
         ("edge-real", Self::EdgeReal),
         ("virtual-first", Self::VirtualFirst),
         ("cones", Self::Cones),
+        ("sharing", Self::Sharing),
         ("last-vertex", Self::LastVertex),
         ("specialisation", Self::Specialisation),
         ("adaptive", Self::Adaptive),
@@ -89,6 +92,7 @@ impl Without {
             | Skip::Beams
             | Skip::EdgeReal
             | Skip::Cones
+            | Skip::Sharing
             | Skip::LastVertex => true,
         })
     }
@@ -118,6 +122,7 @@ impl Without {
             | Skip::EdgeReal
             | Skip::VirtualFirst
             | Skip::Cones
+            | Skip::Sharing
             | Skip::LastVertex
                 if estimator == Estimator::Paper =>
             {
@@ -142,6 +147,7 @@ impl Without {
             (Skip::VirtualFirst, FRAME_BOTH_SHADOWS),
             (Skip::Cones, FRAME_NO_CONES),
             (Skip::LastVertex, FRAME_NO_LAST_VERTEX),
+            (Skip::Sharing, FRAME_NO_SHARING),
         ] {
             if self.contains(skip) {
                 frame.flags |= flag;

@@ -26,8 +26,11 @@ shared! {
         pub pixel: u32,
         pub first: u32,
         pub end: u32,
-        pub pad: u32,
+        /// On a GPU: the pixel's place among those of its sharing tile that lie together in the list, plus [`TILE_PLACES`] times their number.
+        pub tile: u32,
     }
+
+    pub const TILE_PLACES: u32 = 256;
 }
 
 impl PixelWork {
@@ -36,7 +39,7 @@ impl PixelWork {
             pixel,
             first: samples.start,
             end: samples.end,
-            pad: 0,
+            tile: 0,
         }
     }
 

@@ -236,6 +236,26 @@ fn cones_save_error_on_gloss_too(backend: BackendChoice) {
     assert!(with.cost() < without.cost());
 }
 
+/// What it saves depends on the scene; on glossy ground nothing is shared.
+fn sharing_keeps_the_expectation(backend: BackendChoice) {
+    for max_bounces in [2, 4] {
+        let scene = ball_under(LAMP, 0.3, max_bounces);
+        let pair = pair(&scene, backend, Skip::Sharing, None, 64);
+        same_expectation(&pair, Skip::Sharing);
+        assert!(pair[0].rays != pair[1].rays);
+    }
+    let glossy = glossy(ball_under(LAMP, 0.3, 3));
+    nothing_shares(&glossy, backend);
+}
+
+/// The same bits.
+fn nothing_shares(scene: &Scene, backend: BackendChoice) {
+    let picture = |skip| Pictures::of(without(scene, backend, skip), 0..2, None).pictures;
+    let [with, without] = [None, Some(Skip::Sharing)].map(picture);
+    assert!(bits(&with[0]) == bits(&without[0]));
+    assert!(bits(&with[0]) != bits(&with[1]), "control: another seed");
+}
+
 /// At the first vertex of a path, at the second of a difference, and behind the ball.
 fn the_last_vertex_saves_rays(backend: BackendChoice) {
     for max_bounces in [1, 2] {
@@ -315,6 +335,7 @@ on_the_cpu!(
     beams_save_rays,
     cones_save_error,
     cones_save_error_on_gloss_too,
+    sharing_keeps_the_expectation,
     the_last_vertex_saves_rays,
     adaptive_sampling_saves_rays,
     stopping_at_the_cameras_noise_saves_rays,

@@ -35,6 +35,19 @@ impl Rates {
         }
     }
 
+    /// Of several blocks together; at least one.
+    pub fn mean(blocks: impl Iterator<Item = Self>) -> Self {
+        let (mut sum, mut count) = ((0.0, 0.0), 0.0);
+        for rates in blocks {
+            sum = (sum.0 + rates.difference, sum.1 + rates.mixed);
+            count += 1.0;
+        }
+        Self {
+            difference: sum.0 / count,
+            mixed: sum.1 / count,
+        }
+    }
+
     /// The plan of a pixel.
     pub fn pixel(self, flags: u32) -> PixelInfo {
         let mut factor = self.difference;

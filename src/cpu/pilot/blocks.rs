@@ -40,6 +40,33 @@ impl Blocks {
         (y0..y1).flat_map(move |y| (x0..x1).map(move |x| y * width + x))
     }
 
+    /// The blocks of the square that the pixel lies in; `side_px`: a multiple of a block's side.
+    pub fn of_square(&self, pixel: usize, side_px: usize) -> impl Iterator<Item = usize> + use<> {
+        let columns = self.columns;
+        let side = side_px / SIDE_PX;
+        let (x, y) = (
+            pixel % self.width / side_px * side,
+            pixel / self.width / side_px * side,
+        );
+        let (right, below) = ((x + side).min(columns), (y + side).min(self.rows));
+        (y..below).flat_map(move |row| (x..right).map(move |column| row * columns + column))
+    }
+
+    /// The pixels of each square of `side_px` pixels, row by row.
+    pub fn squares(&self, side_px: usize) -> Vec<Vec<usize>> {
+        let (width, height) = (self.width, self.height);
+        let square = |x: usize, y: usize| {
+            let columns = x..(x + side_px).min(width);
+            let rows = y..(y + side_px).min(height);
+            rows.flat_map(|y| columns.clone().map(move |x| y * width + x))
+                .collect()
+        };
+        let corners = (0..height)
+            .step_by(side_px)
+            .flat_map(|y| (0..width).step_by(side_px).map(move |x| (x, y)));
+        corners.map(|(x, y)| square(x, y)).collect()
+    }
+
     /// One pixel of a block, chosen by 32 random bits.
     pub fn pixel(&self, block: usize, random: u32) -> usize {
         let (x0, y0) = self.corner(block);

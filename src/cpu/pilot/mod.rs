@@ -19,9 +19,11 @@ use blocks::Blocks;
 pub(crate) use importance::MAX_LIGHTS_EXAMINED;
 use importance::{PilotLights, importance};
 
+use crate::cpu::sharing::BLOCK_SIDE;
 use crate::packed::{
-    ESTIMATOR_PAPER, FRAME_AOVS, FRAME_BOTH_SHADOWS, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL,
-    PIXEL_OUT_OF_REACH, PackedScene, PixelInfo, SIDE_VIRTUAL,
+    ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_SHARING, Frame,
+    PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PIXEL_SHARES, PIXEL_SHARES_NEAR, PackedScene,
+    PixelInfo, SIDE_VIRTUAL,
 };
 use crate::work::Meter;
 
@@ -95,11 +97,40 @@ pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
             &importances,
         )
     };
-    scene.pixels = flags
-        .into_iter()
-        .enumerate()
-        .map(|(pixel, flags)| rates[blocks.of_pixel(pixel)].pixel(flags))
+    scene.pixels = (0..flags.len())
+        .map(|pixel| rates[blocks.of_pixel(pixel)].pixel(flags[pixel]))
         .collect();
+    if sharing_allowed(scene) {
+        share(&mut scene.pixels, &blocks, &rates);
+    }
+}
+
+/// Gives the pixels of each sharing block one plan, that of its nearest pixel; samples of the others that have no turn cost nothing.
+fn share(pixels: &mut [PixelInfo], blocks: &Blocks, rates: &[Rates]) {
+    let side = BLOCK_SIDE as usize;
+    for square in blocks.squares(side) {
+        let flags = square
+            .iter()
+            .fold(0, |all, &pixel| all | pixels[pixel].flags);
+        let near = flags & PIXEL_BEAM_MAY_MEET_VIRTUAL;
+        let shares = PIXEL_SHARES | if near == 0 { 0 } else { PIXEL_SHARES_NEAR };
+        let rates = blocks.of_square(square[0], side).map(|block| rates[block]);
+        let plan = Rates::mean(rates).pixel(near);
+        for pixel in square {
+            let flags = pixels[pixel].flags;
+            if flags & PIXEL_OUT_OF_REACH == 0 {
+                pixels[pixel] = PixelInfo {
+                    flags: flags | shares,
+                    ..plan
+                };
+            }
+        }
+    }
+}
+
+/// Whether pixels may share second vertices: what is between a vertex and a point must be certain, and equal for all rows.
+fn sharing_allowed(scene: &PackedScene) -> bool {
+    scene.frame.flags & (FRAME_ALPHA | FRAME_NO_SHARING) == 0 && scene.swept_spheres.is_empty()
 }
 
 fn flags_of(scene: &PackedScene, beam: &Beam) -> u32 {
@@ -126,7 +157,15 @@ fn measure(
     };
     // Neither planes nor needless rays shall show in the plan.
     scene.frame.flags &= !(FRAME_AOVS | FRAME_BOTH_SHADOWS);
-    scene.pixels = flags.iter().copied().map(PixelInfo::uniform).collect();
+    let shares = if sharing_allowed(scene) {
+        PIXEL_SHARES
+    } else {
+        0
+    };
+    scene.pixels = flags
+        .iter()
+        .map(|flags| PixelInfo::uniform(flags | shares))
+        .collect();
     let measured = measurement::measure(scene, blocks, || meter.add(STEPS_OF_A_BLOCK));
     scene.frame = frame;
     measured

@@ -53,7 +53,7 @@ fn a_feature_that_is_off_leaves_no_trace() {
         binding_names(&off).is_empty() && !off.contains("7.25"),
         "{off}"
     );
-    let on = compose("first", &Features::all());
+    let on = compose("first", &Features::ALL);
     assert!(
         on.contains("aperture_radius") && on.contains("7.25"),
         "{on}"

@@ -32,7 +32,7 @@ impl Reflected {
         );
         let wgsl = composer
             .with_module("root", root)
-            .compose("root", "main", &Features::all())
+            .compose("root", "main", &Features::ALL)
             .unwrap_or_else(|error| panic!("{}: {error}", declared.path()));
         let module = naga::front::wgsl::parse_str(&wgsl)
             .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&wgsl)));

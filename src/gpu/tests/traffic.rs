@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::cpu::state::POINTS;
 use crate::gpu::kernel::reflect_bindings;
 use crate::gpu::lanes::PARTS_GROUP;
 use crate::gpu::profile::KERNELS;
@@ -10,12 +11,22 @@ use crate::gpu::{Composer, Features};
 const DOC: &str = include_str!("../../../docs/architecture.md");
 const LANE: u32 = 4;
 
-/// Bytes of an element of each array of the state that a kernel binds, in the largest variant of an estimator.
-fn parts(kernel: &str, paper: bool) -> BTreeMap<String, u32> {
-    let features = Features {
-        paper,
-        ..Features::all()
-    };
+/// The largest variants: `direct`, with second vertices shared and without, and `paper`.
+const SHARING: Features = Features {
+    paper: false,
+    ..Features::ALL
+};
+const DIRECT: Features = Features {
+    sharing: false,
+    ..SHARING
+};
+const PAPER: Features = Features {
+    paper: true,
+    ..DIRECT
+};
+
+/// Bytes of an element of each array of the state that a kernel binds.
+fn parts(kernel: &str, features: Features) -> BTreeMap<String, u32> {
     let wgsl = Composer::default()
         .compose("gpu::kernels", kernel, &features)
         .expect("composes");
@@ -27,17 +38,28 @@ fn parts(kernel: &str, paper: bool) -> BTreeMap<String, u32> {
         .collect()
 }
 
-fn state_bytes(paper: bool) -> u32 {
+fn state_bytes(features: Features) -> u32 {
     let all: BTreeMap<_, _> = KERNELS
         .iter()
-        .flat_map(|kernel| parts(kernel, paper))
+        .flat_map(|kernel| parts(kernel, features))
         .collect();
     all.values().sum()
 }
 
 /// Rows of the table.
 fn rows(size: &BTreeMap<String, u32>) -> Vec<String> {
-    let [ray, hits, path, next, real, difference, result] = [
+    let [
+        ray,
+        hits,
+        path,
+        next,
+        real,
+        difference,
+        result,
+        first,
+        capture,
+        points,
+    ] = [
         "path_rays",
         "path_hits",
         "paths",
@@ -45,6 +67,9 @@ fn rows(size: &BTreeMap<String, u32>) -> Vec<String> {
         "path_reals",
         "path_differences",
         "path_results",
+        "path_firsts",
+        "path_captures",
+        "path_points",
     ]
     .map(|part| size[part]);
     let advance = (LANE + ray + hits + path, ray + path + LANE);
@@ -72,17 +97,23 @@ fn rows(size: &BTreeMap<String, u32>) -> Vec<String> {
         ),
         row("advance to the real path behind", with(real, 0)),
         row("advance to the recursion", with(difference, 0)),
+        row("to keep a first vertex, beside", (0, first)),
+        row(
+            "to offer a point, beside",
+            (result, points / POINTS + capture + result),
+        ),
     ]
 }
 
 #[test]
 fn a_step_moves_as_many_bytes_as_the_documentation_says() {
-    let mut size = parts("kernel_advance", false);
+    let mut size = parts("kernel_advance", SHARING);
     for row in rows(&size) {
         assert!(DOC.contains(&row), "docs/architecture.md lacks: {row}");
     }
-    let state = [false, true].map(state_bytes);
-    let sentence = format!("{} bytes, with `paper` {}", state[0], state[1]);
+    let [direct, sharing, paper] = [DIRECT, SHARING, PAPER].map(state_bytes);
+    let sentence =
+        format!("{direct} bytes, {sharing} where second vertices are shared, with `paper` {paper}");
     assert!(
         DOC.contains(&sentence),
         "docs/architecture.md lacks: {sentence}"
@@ -94,11 +125,11 @@ fn a_step_moves_as_many_bytes_as_the_documentation_says() {
 
 #[test]
 fn tracing_touches_the_hot_record_and_the_hits_alone() {
-    for paper in [false, true] {
-        let trace = parts("kernel_trace", paper);
+    for features in [DIRECT, SHARING, PAPER] {
+        let trace = parts("kernel_trace", features);
         assert_eq!(trace.keys().collect::<Vec<_>>(), ["path_hits", "path_rays"]);
         assert!(trace["path_rays"] <= 64, "{trace:?}");
-        let advance = parts("kernel_advance", paper);
+        let advance = parts("kernel_advance", features);
         assert!(advance.len() > trace.len(), "control: {advance:?}");
     }
 }

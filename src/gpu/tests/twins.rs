@@ -46,6 +46,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "the host counts what it need not send",
     ),
     (
+        "cpu::sharing",
+        "number_of tile_lanes",
+        "the CPU passes the members of a tile; a lane finds them",
+    ),
+    (
         "cpu::request",
         "trace",
         "picks the CPU's tree of a world; the shader's trace has both",
@@ -123,6 +128,11 @@ const OTHER_ARGUMENTS: &[(&str, &str, &str)] = &[
         "a shader's sample has a lane, where the parts of its state lie",
     ),
     ("cpu::estimator", "begin_sample", "likewise"),
+    (
+        "cpu::sharing",
+        "link_points gather",
+        "the CPU passes the members of a tile and what they have; a lane finds them",
+    ),
     (
         "film::sums",
         "two_sum sum_add sum3_add pixel_add pixel_add_real guide_add",

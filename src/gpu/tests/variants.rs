@@ -9,9 +9,9 @@ use crate::gpu::{Composer, Features, kernel::reflect_bindings};
 
 /// Nothing on, everything on, each feature alone, all but each.
 fn variants() -> Vec<Features> {
-    let mut variants = vec![Features::default(), Features::all()];
+    let mut variants = vec![Features::default(), Features::ALL];
     for (name, _) in Features::default().flags() {
-        for base in [Features::default(), Features::all()] {
+        for base in [Features::default(), Features::ALL] {
             variants.push(base.toggled(name));
         }
     }
@@ -60,20 +60,23 @@ fn every_variant_is_valid() {
 fn kernels_bind_what_they_use_and_no_more() {
     let composer = Composer::default();
     let set = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
-    let turn = bound(&composer, "kernel_turn", &Features::all());
+    let turn = bound(&composer, "kernel_turn", &Features::ALL);
     assert_eq!(turn, set(&["counters", "indirect"]));
     let accumulate: BTreeSet<String> = set(&[
         "frame",
         "batch",
         "guide_sums",
         "path_first_hits",
+        "path_firsts",
+        "path_links",
+        "path_points",
         "path_radiances_real",
         "path_results",
         "pixel_sums",
         "work",
     ]);
     assert_eq!(
-        bound(&composer, "kernel_accumulate", &Features::all()),
+        bound(&composer, "kernel_accumulate", &Features::ALL),
         accumulate
     );
 }
@@ -248,6 +251,22 @@ const TRACES: &[Trace] = &[
         ..ADVANCE
     },
     Trace {
+        feature: "sharing",
+        with: &[
+            "fn cpu_points__keep_first_vertex",
+            "fn cpu_points__offer_point",
+            "cpu_state__path_points",
+            "cpu_state__path_captures",
+        ],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "sharing",
+        kernel: "kernel_share",
+        with: &["fn cpu_sharing__link_points", "fn cpu_request__answer"],
+        ..ADVANCE
+    },
+    Trace {
         feature: "rough_specular",
         with: &[
             "fn material_ggx__",
@@ -275,7 +294,7 @@ fn a_feature_brings_its_code_and_leaves_with_it() {
         }
         let on = off.toggled(trace.feature);
         assert_ne!(on, off, "there is no feature {}", trace.feature);
-        let code = [on, off, Features::all().toggled(trace.feature)]
+        let code = [on, off, Features::ALL.toggled(trace.feature)]
             .map(|features| valid(&composer, trace.kernel, &features));
         let [on, off, all_but] = &code;
         for (parts, there, gone) in [(trace.with, on, off), (trace.without, off, on)] {
@@ -324,5 +343,5 @@ fn an_invalid_variant_is_noticed() {
         "import package::cpu::state::PathState;
         fn answer(st: ptr<function, PathState>, thread: u32) { @if(clearcoat) { _ = not_there(thread); } }",
     );
-    valid(&broken, "kernel_trace", &Features::all());
+    valid(&broken, "kernel_trace", &Features::ALL);
 }

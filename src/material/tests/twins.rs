@@ -76,7 +76,7 @@ fn run(
     inputs: &[u32],
 ) -> Vec<u32> {
     let probe = Probe {
-        features: Features::all(),
+        features: Features::ALL,
         prelude,
         body,
         input_words: words[0],
@@ -354,9 +354,9 @@ import package::accel::trace::Hit;
         ("photo_albedo", &["material_surface__photo_albedo_at"]),
         ("alpha", &["material_surface__coverage_of"]),
     ];
-    let all = compose(&Features::all());
+    let all = compose(&Features::ALL);
     for (feature, names) in traces {
-        let off = Features::all().toggled(feature);
+        let off = Features::ALL.toggled(feature);
         let without = compose(&off);
         for name in names {
             assert!(all.contains(name), "{name}: {all}");

@@ -17,7 +17,7 @@ use super::stopwatch::Stopwatch;
 use super::tiles::{MARGIN, Tiles, Trial, gain_for};
 use super::{Driver, ErrorGoal, RenderError, Renderer, Skip};
 use crate::film::{Film, Scrambles, composite, pooled};
-use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
+use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_SHARES_NEAR, PixelInfo};
 use crate::work::Watcher;
 
 use series::Series;
@@ -319,7 +319,8 @@ fn mean_rays(film: &Film, pixels: &[PixelInfo]) -> f64 {
 
 /// A pixel's plan with `gain` times the evaluations, at most `most` samples a scramble.
 fn scale(plan: PixelInfo, gain: f64, most: u32) -> PixelInfo {
-    let gain = if plan.flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0 {
+    let near = PIXEL_BEAM_MAY_MEET_VIRTUAL | PIXEL_SHARES_NEAR;
+    let gain = if plan.flags & near != 0 {
         gain.max(1.0)
     } else {
         gain

@@ -1,0 +1,293 @@
+//! Second vertices shared between pixels: every first vertex of a sharing tile uses the points that any of them has found, weighted exactly
+//! (Bekaert, Sbert and Halton 2002, "Accelerating path tracing by re-using paths"). WGSL twin: `shaders/cpu/sharing.wgsl`.
+//!
+//! A tile takes every second pixel of a block of 8 x 8 in either direction: noise that a tile's pixels have in common is spread over the
+//! pixels between. Its members are the samples of equal number whose first vertices were kept. The point y that member i has drawn with the
+//! radiance B adds to member j
+//!
+//! ```text
+//! t_j f_j(w_j) G_j(y) V_j(y) B / sum over members k of P_k p_k(w_k) |cos(y, w_k)| / d_k^2 V_k(y)
+//! ```
+//!
+//! with the members whose first vertices estimate the same (the balance heuristic over the members' techniques; P_k is the chance that k plays its technique at all), f being albedo / pi.
+
+use glam::Vec3;
+
+use super::batch::InFlight;
+use super::request::answer;
+use super::state::*;
+use super::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS};
+use crate::film::is_unusable;
+use crate::light::cones::{cone_pdf, cones_at};
+use crate::material::scatter::lambert_cos;
+use crate::math::{INV_PI, dot3, length3, safe_sqrt};
+use crate::packed::{Frame, NONE, PackedScene, SIDE_REAL, SIDE_VIRTUAL};
+use crate::shared::shared;
+
+shared! {
+    /// Pixels of a tile in either direction, and from one to the next.
+    const TILE_SIDE: u32 = 4;
+    pub const TILE_STRIDE: u32 = 2;
+    /// Pixels along a block's side, which hold the tiles.
+    pub const BLOCK_SIDE: u32 = TILE_SIDE * TILE_STRIDE;
+    /// Members of a tile.
+    pub const MEMBERS: u32 = TILE_SIDE * TILE_SIDE;
+    /// Points found by the cones are dear to share, and are shared within quarters of a tile.
+    const QUARTER_SIDE: u32 = TILE_SIDE / 2;
+    const QUARTER: u32 = QUARTER_SIDE * QUARTER_SIDE;
+    /// Links of a sample's points to the members that may use them.
+    pub const LINKS: u32 = MEMBERS + 2 * QUARTER;
+    /// Points nearer than this, squared metres, count as this far: weights stay finite.
+    const LEAST_DISTANCE2: f32 = 1e-20;
+    /// A length or density below it is none.
+    const MIN_POSITIVE: f32 = f32::MIN_POSITIVE;
+
+    /// A first vertex and a point, as they see each other if nothing is between.
+    #[derive(Clone, Copy, Debug, Default)]
+    value struct Link {
+        /// Share of the point's radiance that arrives for each square metre about it, times 1 / pi.
+        transfer: f32,
+        /// With which the vertex's technique draws the point, 1 / square metre.
+        density: f32,
+    }
+}
+
+/// Number of a pixel's tile.
+pub fn tile_of(width: u32, pixel: u32) -> u32 {
+    let (x, y) = (pixel % width, pixel / width);
+    let blocks = width.div_ceil(BLOCK_SIDE);
+    let block = y / BLOCK_SIDE * blocks + x / BLOCK_SIDE;
+    (block * TILE_STRIDE + y % TILE_STRIDE) * TILE_STRIDE + x % TILE_STRIDE
+}
+
+/// Number of a pixel among the members of its tile: row by row.
+pub fn member_of(width: u32, pixel: u32) -> u32 {
+    let (x, y) = (pixel % width, pixel / width);
+    y % BLOCK_SIDE / TILE_STRIDE * TILE_SIDE + x % BLOCK_SIDE / TILE_STRIDE
+}
+
+/// Number of a member's quarter of its tile.
+fn quarter_of(member: u32) -> u32 {
+    let (column, row) = (member % TILE_SIDE, member / TILE_SIDE);
+    row / QUARTER_SIDE * 2 + column / QUARTER_SIDE
+}
+
+/// Of the points of one sample to the members of its tile, by [`link_of`].
+pub type Links = [f32; LINKS as usize];
+
+/// `kind`: `POINT_*`.
+fn link_to(frame: &Frame, first: &FirstVertex, point: &SharedPoint, kind: u32) -> Link {
+    let to_point = point.position - first.origin.position;
+    let distance2 = dot3(to_point, to_point).max(LEAST_DISTANCE2);
+    let direction = to_point / safe_sqrt(distance2);
+    let cosine = lambert_cos(first.ng, first.ns, direction) * INV_PI;
+    let solid_angle = (-dot3(point.ng, direction)).max(0.0) / distance2;
+    let drawn = if kind == POINT_RECURSION {
+        first.bsdf_probability * cosine
+    } else {
+        let cones = cones_at(frame, first.origin.position, first.ns);
+        first.cone_probability * cone_pdf(&cones, direction)
+    };
+    Link {
+        transfer: cosine * solid_angle,
+        density: drawn * solid_angle,
+    }
+}
+
+/// Whether the vertex really sees the point; what is covered, past something virtual. `probe` traces and counts.
+fn sees(
+    scene: &PackedScene,
+    probe: &mut PathState,
+    first: &FirstVertex,
+    point: &SharedPoint,
+    kind: u32,
+) -> bool {
+    let to_point = point.position + point.ng * point.error - first.origin.position;
+    let distance = length3(to_point).max(MIN_POSITIVE);
+    let error = length3(first.origin.offset);
+    let covered = kind == POINT_COVERED;
+    probe.ray = PathRay {
+        origin: first.origin,
+        direction: to_point / distance,
+        t_max: distance - SHADOW_SHORTEN * distance - SHADOW_SHORTEN_ERRORS * error,
+        request: if covered {
+            REQUEST_SHADOW_DIFFERENCE
+        } else {
+            REQUEST_SHADOW_MIXED
+        },
+        side: if first.kept == FIRST_VIRTUAL {
+            SIDE_VIRTUAL
+        } else {
+            SIDE_REAL
+        },
+        depth: 1,
+        opacity_seed: 0,
+    };
+    answer(scene, probe);
+    let open_virtual = probe.hits.in_virtual.triangle == NONE;
+    let open_real = probe.hits.in_real.triangle == NONE;
+    open_real && open_virtual != covered
+}
+
+/// Where the links of a point begin, and the members that may use it: all of the tile, or those of the same quarter.
+fn first_link(kind: u32) -> u32 {
+    if kind == POINT_RECURSION {
+        0
+    } else {
+        MEMBERS + (kind - 1) * QUARTER
+    }
+}
+
+/// Place of a member's link among those of a point; `LINKS`: it may not use the point.
+fn link_of(kind: u32, from: u32, to: u32) -> u32 {
+    if kind == POINT_RECURSION {
+        return to;
+    }
+    if quarter_of(from) != quarter_of(to) {
+        return LINKS;
+    }
+    let (column, row) = (to % TILE_SIDE, to / TILE_SIDE);
+    first_link(kind) + row % QUARTER_SIDE * QUARTER_SIDE + column % QUARTER_SIDE
+}
+
+/// A sample that takes part in its tile.
+#[derive(Clone, Copy)]
+pub struct Member {
+    /// Its place in the batch.
+    pub slot: usize,
+    /// Its pixel's number in the tile.
+    pub number: u32,
+}
+
+/// Weighs the points of one member's sample against all members that could have drawn them: how much of a point's radiance each of them
+/// takes, albedo and throughput apart. `probe` traces and counts.
+pub fn link_points(
+    scene: &PackedScene,
+    samples: &[InFlight],
+    members: &[Member],
+    from: Member,
+    probe: &mut PathState,
+) -> Links {
+    let mut links = [0.0; LINKS as usize];
+    let kept = samples[from.slot].state.first.kept;
+    for kind in 0..POINTS {
+        let point = samples[from.slot].state.points[kind as usize];
+        if point.strength == 0.0 || point.radiance == Vec3::ZERO {
+            continue;
+        }
+        if is_unusable(point.radiance) {
+            // One sample's fault stays its own.
+            links[link_of(kind, from.number, from.number) as usize] = 1.0;
+            continue;
+        }
+        let mut density = 0.0;
+        for member in members {
+            let place = link_of(kind, from.number, member.number);
+            let first = &samples[member.slot].state.first;
+            if place == LINKS || first.kept != kept {
+                continue;
+            }
+            let link = link_to(&scene.frame, first, &point, kind);
+            if link.transfer > 0.0
+                && (member.slot == from.slot || sees(scene, probe, first, &point, kind))
+            {
+                links[place as usize] = link.transfer;
+                density += link.density;
+            }
+        }
+        let scale = 1.0 / (density * point.strength).max(MIN_POSITIVE);
+        for place in first_link(kind)..first_link(kind + 1) {
+            links[place as usize] *= scale;
+        }
+    }
+    links
+}
+
+/// What a member's sample takes of the points of all members' samples, by their links.
+pub fn gather(samples: &[InFlight], members: &[Member], links: &[Links], to: Member) -> Vec3 {
+    let mut light = Vec3::ZERO;
+    for (from, links) in members.iter().zip(links) {
+        for kind in 0..POINTS {
+            let point = &samples[from.slot].state.points[kind as usize];
+            let place = link_of(kind, from.number, to.number);
+            if point.strength == 0.0 || place == LINKS || links[place as usize] == 0.0 {
+                continue;
+            }
+            let taken = point.radiance * links[place as usize];
+            light += if kind == POINT_COVERED { -taken } else { taken };
+        }
+    }
+    light * samples[to.slot].state.first.throughput
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::cpu::state::path_state;
+    use crate::pack::test_scene;
+    use crate::packed::PackedScene;
+
+    #[test]
+    fn a_block_holds_four_tiles_of_sixteen_members_and_each_link_has_a_place() {
+        let width = 43;
+        let in_block = (8..16).flat_map(|y| (16..24).map(move |x| y * width + x));
+        let places: BTreeSet<_> = (in_block.clone())
+            .map(|pixel| (tile_of(width, pixel), member_of(width, pixel)))
+            .collect();
+        assert_eq!(places.len(), 64);
+        let tiles: BTreeSet<_> = places.iter().map(|(tile, _)| tile).collect();
+        assert_eq!(
+            (tiles.len(), tiles.last().copied()),
+            (4, Some(&(4 * (6 + 2) + 3)))
+        );
+        let neighbours = [
+            tile_of(width, 8 * width + 16),
+            tile_of(width, 8 * width + 17),
+        ];
+        assert_ne!(neighbours[0], neighbours[1]);
+        for from in 0..MEMBERS {
+            let all = (0..POINTS).flat_map(|kind| (0..MEMBERS).map(move |to| (kind, to)));
+            let mut links: Vec<u32> = all.map(|(kind, to)| link_of(kind, from, to)).collect();
+            links.retain(|&place| place != LINKS);
+            links.sort_unstable();
+            assert!(links.iter().copied().eq(0..LINKS), "{links:?}");
+        }
+    }
+
+    /// A disc of radius R that faces a point of a plane at distance h sends it R^2 / (R^2 + h^2) of what an infinite one does.
+    #[test]
+    fn links_sum_to_the_form_factor_of_a_disc() {
+        let frame = PackedScene::build(&test_scene(), &crate::work::Watcher::none())
+            .expect("packs")
+            .frame;
+        let mut first = path_state(0, 0).first;
+        (first.ng, first.ns, first.bsdf_probability) = (Vec3::Z, Vec3::Z, 0.25);
+        let (height, radius) = (0.7_f64, 1.3_f64);
+        let cells = 400;
+        let cell = 2.0 * radius / f64::from(cells);
+        let at = |i: i32| (f64::from(i) + 0.5) * cell - radius;
+        let (mut transfer, mut density) = (0.0, 0.0);
+        for (x, y) in (0..cells).flat_map(|x| (0..cells).map(move |y| (at(x), at(y)))) {
+            if x.hypot(y) < radius {
+                let mut point = path_state(0, 0).points[0];
+                point.position = Vec3::new(x as f32, y as f32, height as f32);
+                point.ng = -Vec3::Z;
+                let link = link_to(&frame, &first, &point, POINT_RECURSION);
+                transfer += f64::from(link.transfer) * cell * cell;
+                density += f64::from(link.density) * cell * cell;
+            }
+        }
+        let form_factor = radius.powi(2) / (radius.powi(2) + height.powi(2));
+        assert!(
+            (transfer / form_factor - 1.0).abs() < 1e-3,
+            "{transfer} {form_factor}"
+        );
+        assert!((density / (0.25 * form_factor) - 1.0).abs() < 1e-3);
+        assert!(
+            (transfer / (1.01 * form_factor) - 1.0).abs() > 1e-3,
+            "control"
+        );
+    }
+}
