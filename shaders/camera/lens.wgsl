@@ -134,3 +134,18 @@ fn lens_undistort(xd: f32, yd: f32) -> vec2<f32> {
     }
     return vec2<f32>(x, y);
 }
+
+fn lens_area(x: f32, y: f32) -> f32 {
+    let k1 = frame.distortion.x;
+    let k2 = frame.distortion.y;
+    let p1 = frame.distortion.z;
+    let p2 = frame.distortion.w;
+    let k3 = frame.distortion_k3;
+    let r2 = x * x + y * y;
+    let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    let slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
+    let xx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x;
+    let xy = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
+    let yy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
+    return abs(xx * yy - xy * xy);
+}

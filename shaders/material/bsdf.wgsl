@@ -254,6 +254,10 @@ fn bsdf_is_delta(s: Surface) -> bool {
     return max3(diffuse_color(s)) == 0.0 && reflects_delta(s) && (s.clearcoat == 0.0 || coat_delta(s));
 }
 
+fn bsdf_passes_straight(s: Surface) -> bool {
+    return thin_walled(s) || surface_index(s).eta2_minus_1 == 0.0;
+}
+
 fn bsdf_is_lambertian(s: Surface) -> bool {
     return (s.flags & MATERIAL_LAMBERTIAN) != 0u;
 }

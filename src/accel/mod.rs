@@ -47,6 +47,11 @@ pub const MAX_COORDINATE_M: f32 = 1.0e13;
 /// Most triangles in one world: child words keep 28 bits for a block of eight.
 pub const MAX_TRIANGLES: usize = 1 << 27;
 
+/// At most `max` spheres (centre, radius) over triangles, as [`WorldBvh::bounding_spheres`].
+pub fn covering_spheres(triangles: &[[Vec3; 3]], max: usize) -> Vec<[f32; 4]> {
+    spheres::cover(triangles, max)
+}
+
 /// A half-line with the interval in which hits count.
 ///
 /// A hit at distance `t` counts if `t > t_min`, or `t == t_min` and its triangle id is larger than `skip`, and if `t < t_max`. A ray that

@@ -2,6 +2,7 @@
 
 pub mod contribution;
 pub mod estimator;
+pub mod photons;
 pub mod pilot;
 pub mod render;
 pub mod request;

@@ -74,6 +74,15 @@ shared! {
     /// A vertex to be shaded: `vertex_hit`, reached along the ray. Never left pending while a ray is traced.
     pub const PENDING_VERTEX: u32 = 16;
 
+    /// The path has scattered other than by a mirror or a smooth interface: what it finds is clamped.
+    pub const EVENT_SCATTERED: u32 = 1;
+    /// It did so at its first vertex: photons that land there can be seen by the camera.
+    pub const EVENT_SEEN: u32 = 2;
+    /// Since it last did so it has met smooth virtual surfaces.
+    pub const EVENT_VIRTUAL_CHAIN: u32 = 4;
+    /// Since it last did so it has met smooth real surfaces.
+    pub const EVENT_REAL_CHAIN: u32 = 8;
+
     /// Density that stands for a delta distribution: no other technique can find its directions.
     pub const DELTA_DENSITY: f32 = -1.0;
 
@@ -145,8 +154,8 @@ shared! {
         pub pending: u32,
         /// Material whose volume the path is inside, or NONE.
         pub medium: u32,
-        /// 1 once the path has scattered other than by a mirror or a smooth interface: what it finds is clamped.
-        pub indirect: u32,
+        /// `EVENT_*` bits: how the path has scattered so far.
+        pub events: u32,
         /// Surface interactions up to and including the first vertex of the real path that waits.
         pub real_depth: u32,
     }
@@ -181,7 +190,9 @@ shared! {
         pub depth: u32,
         /// [`REQUEST_REAL_UNLESS_COVERED`] where what the cones cover is left to them, else [`REQUEST_CLOSEST_EACH`].
         pub request: u32,
-        pub pad: [u32; 2],
+        /// As [`Path::events`], once the ray is followed.
+        pub events: u32,
+        pub pad: u32,
     }
 
     /// What the sample has found.
@@ -267,7 +278,7 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
             mode: MODE_MIXED,
             pending: 0,
             medium: NONE,
-            indirect: 0,
+            events: 0,
             real_depth: 0,
         },
         next: NO_SEGMENT,
@@ -282,7 +293,8 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
             cone_probability: 0.0,
             depth: 0,
             request: 0,
-            pad: [0; 2],
+            events: 0,
+            pad: 0,
         },
         result: PathResult {
             radiance: Vec3::ZERO,

@@ -11,7 +11,8 @@ use crate::light::cones::{
 };
 use crate::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 use crate::material::{
-    Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample,
+    Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_passes_straight,
+    bsdf_sample,
 };
 use crate::math::{dot3, exp_, safe_sqrt};
 use crate::packed::{
@@ -37,7 +38,7 @@ shared! {
     const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
     /// Surfaces that scatter nothing.
-    const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
+    pub const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
 }
 
 /// What the techniques of a difference vertex share.
@@ -52,20 +53,26 @@ fn is_difference(st: &PathState) -> bool {
     st.path.mode == MODE_DIFFERENCE
 }
 
+/// Share of light that goes a distance (metres) through the volume of a material, or through none.
+pub fn transmittance(scene: &PackedScene, medium: u32, distance: f32) -> Vec3 {
+    if medium == NONE {
+        return Vec3::ONE;
+    }
+    let sigma = scene.materials[medium as usize].sigma_a;
+    Vec3::new(
+        exp_(-sigma[0] * distance),
+        exp_(-sigma[1] * distance),
+        exp_(-sigma[2] * distance),
+    )
+}
+
 /// Adds the emission at the vertex and plans its shadow ray and continuations. A difference vertex (mode `MODE_DIFFERENCE`) does not emit,
 /// for both worlds see it; its throughput multiplies the difference there.
 pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     let difference = is_difference(st);
     let wo = -st.ray.direction;
     let distance = st.vertex_hit.t;
-    if st.path.medium != NONE {
-        let sigma = scene.materials[st.path.medium as usize].sigma_a;
-        st.path.throughput *= Vec3::new(
-            exp_(-sigma[0] * distance),
-            exp_(-sigma[1] * distance),
-            exp_(-sigma[2] * distance),
-        );
-    }
+    st.path.throughput *= transmittance(scene, st.path.medium, distance);
     if !difference {
         add_emission(scene, st, s, distance);
     }
@@ -75,6 +82,21 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     {
         return;
     }
+    stand_at(scene, st, s, distance);
+
+    let techniques = difference.then(|| techniques_at(scene, st, s, wo));
+    next_event(scene, st, s, wo, techniques.as_ref());
+    if lights_suffice(scene, st, s) {
+        return;
+    }
+    if let Some(techniques) = &techniques {
+        plan_cone(scene, st, s, wo, techniques);
+    }
+    plan_continuation(scene, st, s, wo, techniques.as_ref());
+}
+
+/// The next rays leave the vertex.
+pub fn stand_at(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: f32) {
     let side = u32::from(st.vertex_hit.triangle >= scene.frame.real_triangle_count);
     let leaves_coinciding_real = side == 1 && st.ray.side == 0 && coincides(st, s, distance);
     let reach = 1.0 + COINCIDENCE * distance / s.error;
@@ -89,16 +111,6 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
         },
     };
     st.ray.side = side;
-
-    let techniques = difference.then(|| techniques_at(scene, st, s, wo));
-    next_event(scene, st, s, wo, techniques.as_ref());
-    if lights_suffice(scene, st, s) {
-        return;
-    }
-    if let Some(techniques) = &techniques {
-        plan_cone(scene, st, s, wo, techniques);
-    }
-    plan_continuation(scene, st, s, wo, techniques.as_ref());
 }
 
 /// Whether the light drawn at the vertex is all the light there is to find: past the last vertex a path finds only emitters. (`paper` traces
@@ -152,6 +164,12 @@ fn coincides(st: &PathState, s: &Surface, distance: f32) -> bool {
 
 fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: f32) {
     if s.emission.max_element() <= 0.0 {
+        return;
+    }
+    if s.light != NONE
+        && scene.lights[s.light as usize].photon_pdf > 0.0
+        && left_to_photons(scene, st)
+    {
         return;
     }
     let mut weight = 1.0;
@@ -301,7 +319,7 @@ fn plan_cone(
 }
 
 /// Material whose volume a direction from the vertex leads through, or NONE.
-fn medium_along(st: &PathState, s: &Surface, direction: Vec3) -> u32 {
+pub fn medium_along(st: &PathState, s: &Surface, direction: Vec3) -> u32 {
     if s.flags & MATERIAL_THIN_WALLED != 0 || s.ng.dot(direction) >= 0.0 {
         return st.path.medium;
     }
@@ -340,6 +358,12 @@ fn plan_continuation(
     if !b.valid {
         return;
     }
+    let straight = b.delta && b.transmitted && bsdf_passes_straight(s);
+    let events = if straight {
+        st.path.events
+    } else {
+        events_after(st.path.events, st.ray.depth, st.ray.side, b.delta)
+    };
     let mut segment = Segment {
         direction: b.wi,
         density: if b.delta { DELTA_DENSITY } else { b.pdf },
@@ -360,7 +384,8 @@ fn plan_continuation(
             } else {
                 REQUEST_CLOSEST_EACH
             },
-            pad: [0; 2],
+            events,
+            pad: 0,
         };
         return;
     }
@@ -372,5 +397,6 @@ fn plan_continuation(
         segment.throughput *= 1.0 / survival;
     }
     st.path.pending |= PENDING_NEXT;
+    st.path.events = events;
     st.next = segment;
 }

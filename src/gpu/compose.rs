@@ -72,6 +72,8 @@ features! {
     rough_specular,
     /// The camera moves while the shutter is open.
     shutter,
+    /// Photons are traced.
+    photons,
 }
 
 impl Features {
@@ -115,6 +117,7 @@ impl Features {
             paper: scene.frame.estimator == packed::ESTIMATOR_PAPER,
             rough_specular: material(&|m| m.flags & no_lobe == 0),
             shutter: scene.frame.flags & packed::FRAME_SHUTTER != 0,
+            photons: cpu::contribution::photons_traced(&scene.frame),
         }
     }
 }
@@ -145,6 +148,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &accel::trace::SHARED,
     &camera::sampler::SHARED,
     &camera::shutter::SHARED,
+    &camera::splat::SHARED,
     &light::cones::SHARED,
     &light::rectangle::SHARED,
     &material::bsdf::SHARED,
@@ -154,8 +158,11 @@ pub(super) const DECLARED: &[&Module] = &[
     &material::texture::SHARED,
     &film::sums::SHARED,
     &super::lanes::SHARED,
+    &super::photons::SHARED,
     &cpu::contribution::SHARED,
     &cpu::estimator::SHARED,
+    &cpu::photons::emission::SHARED,
+    &cpu::photons::path::SHARED,
     &cpu::request::SHARED,
     &cpu::state::SHARED,
     &cpu::vertex::SHARED,

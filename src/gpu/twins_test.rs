@@ -41,6 +41,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ),
     ("cpu::vertex", "max_element", "glam has it"),
     (
+        "cpu::photons::emission",
+        "no_emission",
+        "a constant in Rust",
+    ),
+    (
         "cpu::estimator",
         "samples_without_turn",
         "the host counts what it need not send",
@@ -115,7 +120,7 @@ fn exceptions() -> impl Iterator<Item = (&'static str, &'static str)> {
 }
 
 /// Where kernels begin: their host's side drives them by name, and walks the pixels or samples of its own in their place.
-const KERNEL_MODULES: &[&str] = &["gpu::kernels", "::gpu"];
+const KERNEL_MODULES: &[&str] = &["gpu::kernels", "gpu::photons", "::gpu"];
 
 fn is_kernel_module(module: &str) -> bool {
     KERNEL_MODULES

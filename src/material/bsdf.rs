@@ -331,6 +331,11 @@ pub fn bsdf_is_delta(s: &Surface) -> bool {
     max3(diffuse_color(s)) == 0.0 && reflects_delta(s) && (s.clearcoat == 0.0 || coat_delta(s))
 }
 
+/// What a smooth interface lets through goes straight on: it bends nothing.
+pub fn bsdf_passes_straight(s: &Surface) -> bool {
+    thin_walled(s) || surface_index(s).eta2_minus_1 == 0.0
+}
+
 /// f = base colour / pi, whatever the directions.
 pub fn bsdf_is_lambertian(s: &Surface) -> bool {
     s.flags & MATERIAL_LAMBERTIAN != 0

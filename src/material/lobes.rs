@@ -67,16 +67,26 @@ pub fn surface_index(s: &Surface) -> RelativeIndex {
     relative_index(s.ior, s.front || thin_walled(s))
 }
 
+/// Whether a lobe of that GGX alpha counts as perfectly smooth.
+pub fn is_smooth(alpha: f32) -> bool {
+    alpha < DELTA_ALPHA
+}
+
+/// Whether the interface of a volume with that index, of a GGX alpha, lets light through unblurred.
+pub fn transmits_unblurred(alpha: f32, ior: f32) -> bool {
+    is_smooth(alpha) || alpha * (ior - 1.0).abs() < DELTA_BEND
+}
+
 pub fn reflects_delta(s: &Surface) -> bool {
-    s.ggx_alpha < DELTA_ALPHA
+    is_smooth(s.ggx_alpha)
 }
 
 pub fn transmits_delta(s: &Surface) -> bool {
-    reflects_delta(s) || (!thin_walled(s) && s.ggx_alpha * (s.ior - 1.0).abs() < DELTA_BEND)
+    reflects_delta(s) || (!thin_walled(s) && transmits_unblurred(s.ggx_alpha, s.ior))
 }
 
 pub fn coat_delta(s: &Surface) -> bool {
-    s.coat_alpha < DELTA_ALPHA
+    is_smooth(s.coat_alpha)
 }
 
 pub fn cos_to(normal: Vec3, wo: Vec3) -> f32 {

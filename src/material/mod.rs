@@ -15,7 +15,8 @@ pub(crate) mod texture;
 
 pub use bsdf::{
     BsdfEval, BsdfSample, bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_is_delta,
-    bsdf_is_lambertian, bsdf_sample,
+    bsdf_is_lambertian, bsdf_passes_straight, bsdf_sample,
 };
+pub use lobes::{is_smooth, transmits_unblurred};
 pub use surface::{Surface, surface_alpha, surface_at, triangle_emission};
 pub use texture::{srgb_decode, texture_sample};

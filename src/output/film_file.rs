@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::ChannelFile;
 use super::exr_file::{Channels, push_channel, write_layers};
 use super::{Metadata, OutputError, Target};
-use crate::film::{Film, GuideSums, Picture, PixelSums, Planes, Sum3};
+use crate::film::{Film, GuideSums, Picture, PixelSums, Planes, SplatSums, Sum3};
 use crate::renderer::Without;
 use crate::scene::{Choice, Composite, Estimator, Overrides, SamplerKind, Scene, Settings};
 
@@ -43,7 +43,7 @@ const NOTE: &str = "mixray.film";
 /// The attribute that films of the first form had.
 const NOTE_OF_FORM_1: &str = "mixray.film.version";
 /// The form of note and channels that this program writes and reads.
-const FORM: u32 = 2;
+const FORM: u32 = 3;
 
 #[derive(Serialize)]
 struct WrittenNote<'a> {
@@ -228,6 +228,12 @@ pub fn write_film(
         let hits: Vec<u32> = film.guides.iter().map(|g| g.hits).collect();
         push_channel(&mut channels, GUIDE_HITS, hits);
     }
+    if !film.splats.is_empty() {
+        for (name, get, _) in splat_fields() {
+            let samples = film.splats.iter().map(get).collect::<Vec<u32>>();
+            push_channel(&mut channels, &name, samples);
+        }
+    }
     let text = note.to_text(folder_of(target.path()));
     write_layers(
         target,
@@ -274,6 +280,7 @@ fn film_of(file: &ChannelFile, note: &FilmNote) -> Result<Film, String> {
         first_sample: note.range.0,
         pixels: vec![PixelSums::zeroed(); count],
         guides: Vec::new(),
+        splats: Vec::new(),
     };
     for (name, _, set) in float_fields() {
         fill(&mut film.pixels, finite(file, &name)?, set);
@@ -287,6 +294,13 @@ fn film_of(file: &ChannelFile, note: &FilmNote) -> Result<Film, String> {
         fill(&mut film.guides, hits, |guide, hits| guide.hits = hits);
         for (name, _, set) in guide_fields() {
             fill(&mut film.guides, finite(file, &name)?, set);
+        }
+    }
+    if splat_fields().any(|(name, _, _)| file.counts.contains_key(&name)) {
+        film.set_photons(true);
+        for (name, _, set) in splat_fields() {
+            let samples = file.counts.get(&name).ok_or_else(|| missing(&name))?;
+            fill(&mut film.splats, samples, set);
         }
     }
     Ok(film)
@@ -323,6 +337,31 @@ const GUIDE_HITS: &str = "sums.hits.Y";
 
 /// A channel's name, and how its samples are read from and written to a record.
 type Field<R, T, N> = (N, Box<dyn Fn(&R) -> T>, Box<dyn Fn(&mut R, T)>);
+
+/// What photons brought, each number as a low and a high word.
+fn splat_fields() -> impl Iterator<Item = Field<SplatSums, u32, String>> {
+    const SUMS: usize = size_of::<SplatSums>() / size_of::<u64>();
+    const NAMES: [&str; SUMS] = [
+        "diff.R", "diff.G", "diff.B", "m_im.R", "m_im.G", "m_im.B", "sq.R", "sq.G", "sq.B", "photons.Y",
+    ];
+    let word = |at: usize, shift: u32| -> Field<SplatSums, u32, String> {
+        let (sum, axis) = NAMES[at].split_once('.').unwrap_or((NAMES[at], "Y"));
+        let part = if shift == 0 { "lo" } else { "hi" };
+        (
+            format!("splats.{sum}.{part}.{axis}"),
+            Box::new(move |sums| (splat_words(sums)[at] >> shift) as u32),
+            Box::new(move |sums, bits| {
+                let word: &mut [u64; SUMS] = bytemuck::cast_mut(sums);
+                word[at] |= u64::from(bits) << shift;
+            }),
+        )
+    };
+    (0..SUMS).flat_map(move |at| [word(at, 0), word(at, 32)])
+}
+
+fn splat_words(sums: &SplatSums) -> [u64; size_of::<SplatSums>() / size_of::<u64>()] {
+    bytemuck::cast(*sums)
+}
 
 /// Six channels of three double-floats.
 fn sum3_fields<R: 'static>(

@@ -6,6 +6,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use super::camera::frame_camera;
 use super::lights::pack_lights;
+use super::photons::TracedEnvironment;
 use crate::accel::{AccelError, WorldBvh};
 use crate::light::environment_table::environment_table;
 use crate::packed::materials::{MaterialKey, MaterialTable};
@@ -70,6 +71,8 @@ impl PackedScene {
             material_table: MaterialTable::default(),
             real_vertex_count: 0,
             env_mean_luminance: 0.0,
+            env_traced: TracedEnvironment::default(),
+            photons_per_ray: 0,
         };
         packed.set_camera(scene);
         packed.set_settings(scene);
@@ -102,6 +105,7 @@ impl PackedScene {
             .any(|m| m.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0);
         self.frame.flags = self.frame.flags & !FRAME_ALPHA | if alpha { FRAME_ALPHA } else { 0 };
         pack_lights(self, scene);
+        self.pack_photons();
         Ok(())
     }
 
@@ -121,6 +125,7 @@ impl PackedScene {
             &mut self.frame,
         );
         self.frame.flags &= !(FRAME_SHUTTER | FRAME_SHUTTER_ORDERED);
+        (self.frame.shutter_open, self.frame.shutter_row) = (1.0, 0.0);
         let count = scene.camera.width as usize * scene.camera.height as usize;
         self.pixels = vec![PixelInfo::uniform(PIXEL_BEAM_MAY_MEET_VIRTUAL); count];
     }
@@ -175,6 +180,13 @@ impl PackedScene {
                 self.frame.env_height = *height;
                 self.frame.env_radiance = [scale, scale, scale, table.normaliser];
                 self.env_mean_luminance = table.mean_luminance * environment.scale;
+                self.env_traced = TracedEnvironment::of_map(
+                    *width,
+                    *height,
+                    &self.env_texels,
+                    environment.scale,
+                    self.env_mean_luminance,
+                );
                 self.env_cdf = table.cdf;
             }
         }

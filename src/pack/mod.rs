@@ -3,6 +3,7 @@
 mod build;
 pub mod camera;
 mod lights;
+mod photons;
 mod shutter;
 #[cfg(test)]
 mod test_support;
@@ -12,6 +13,7 @@ mod tests;
 pub use build::{PackError, next_anchor};
 #[cfg(feature = "bench")]
 pub(crate) use lights::FEW_LIGHTS;
+pub use photons::TracedEnvironment;
 pub use shutter::{Instant, instants, row_ends, traced_shutter};
 #[cfg(test)]
 pub use test_support::{test_mesh, test_scene};

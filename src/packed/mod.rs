@@ -9,6 +9,7 @@ pub(crate) mod records;
 pub use records::*;
 
 use crate::accel::WorldBvh;
+use crate::pack::TracedEnvironment;
 pub use crate::shared::NONE;
 
 /// What a backend renders.
@@ -42,6 +43,9 @@ pub struct PackedScene {
     pub(crate) material_table: materials::MaterialTable,
     pub(crate) real_vertex_count: usize,
     pub(crate) env_mean_luminance: f64,
+    pub(crate) env_traced: TracedEnvironment,
+    /// Photons traced for every ray per pixel; 0 where none are.
+    pub photons_per_ray: u64,
 }
 
 #[cfg(test)]
@@ -68,6 +72,8 @@ impl PackedScene {
             material_table: materials::MaterialTable::default(),
             real_vertex_count: 0,
             env_mean_luminance: 0.0,
+            env_traced: TracedEnvironment::default(),
+            photons_per_ray: 0,
         }
     }
 }

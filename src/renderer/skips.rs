@@ -2,7 +2,7 @@
 
 use super::ErrorGoal;
 use crate::packed::{
-    FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL,
+    FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, FRAME_NO_PHOTONS, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL,
     PIXEL_OUT_OF_REACH, PixelInfo,
 };
 use crate::scene::{Choice, Estimator};
@@ -26,6 +26,9 @@ pub enum Skip {
     Cones,
     /// Where a few lights are all the light there is, a diffuse last vertex leaves all to its shadow ray. The expectation is the same.
     LastVertex,
+    /// Caustics of smooth virtual objects come as photons from the lights; without them the eye's paths look for them, and those of lights without
+    /// size stay dark. The expectation is the same but for those.
+    Photons,
     /// Shaders hold the code that the scene needs and no more (GPU). The result is the same to rounding.
     Specialisation,
     /// With a goal, each tile takes the samples that it needs; without, every tile those of the neediest. Both reach the goal.
@@ -44,6 +47,7 @@ impl Choice for Skip {
         ("virtual-first", Self::VirtualFirst),
         ("cones", Self::Cones),
         ("last-vertex", Self::LastVertex),
+        ("photons", Self::Photons),
         ("specialisation", Self::Specialisation),
         ("adaptive", Self::Adaptive),
         ("camera-noise", Self::CameraNoise),
@@ -89,7 +93,8 @@ impl Without {
             | Skip::Beams
             | Skip::EdgeReal
             | Skip::Cones
-            | Skip::LastVertex => true,
+            | Skip::LastVertex
+            | Skip::Photons => true,
         })
     }
 
@@ -119,6 +124,7 @@ impl Without {
             | Skip::VirtualFirst
             | Skip::Cones
             | Skip::LastVertex
+            | Skip::Photons
                 if estimator == Estimator::Paper =>
             {
                 Some("the estimator is paper")
@@ -142,6 +148,7 @@ impl Without {
             (Skip::VirtualFirst, FRAME_BOTH_SHADOWS),
             (Skip::Cones, FRAME_NO_CONES),
             (Skip::LastVertex, FRAME_NO_LAST_VERTEX),
+            (Skip::Photons, FRAME_NO_PHOTONS),
         ] {
             if self.contains(skip) {
                 frame.flags |= flag;
@@ -233,9 +240,9 @@ mod tests {
     #[test]
     fn only_what_may_show_is_kept_with_films_and_pictures() {
         let all: Without = Skip::CHOICES.iter().map(|&(_, skip)| skip).collect();
-        let of_pictures = "plan,beams,cones,last-vertex";
+        let of_pictures = "plan,beams,cones,last-vertex,photons";
         assert_eq!(all.of_pictures(false).names(), of_pictures);
-        let of_films = "out-of-reach,plan,beams,edge-real,cones,last-vertex";
+        let of_films = "out-of-reach,plan,beams,edge-real,cones,last-vertex,photons";
         assert_eq!(all.of_films(false).names(), of_films);
         let on_gpu = format!("{of_films},specialisation");
         assert_eq!(all.of_films(true).names(), on_gpu);

@@ -2,9 +2,11 @@
 //! [`WorkList`] and fills it into the film, whatever it was made for.
 
 mod list;
+mod photons;
 mod rays;
 mod watcher;
 
 pub use list::{Pass, PixelWork, WorkList};
+pub use photons::PhotonWork;
 pub use rays::RayCounts;
 pub use watcher::{Meter, Phase, Progress, Watcher};

@@ -12,6 +12,8 @@ mod measurement;
 
 use rayon::prelude::*;
 
+use super::contribution::photons_traced;
+use super::photons::plan::{EyeMoments, photons_per_ray, unmeasured};
 use allocation::{Rates, allocate};
 use beam::Beam;
 use blocks::Blocks;
@@ -35,6 +37,7 @@ pub fn pilot(scene: &mut PackedScene) {
     let nothing_virtual = scene.frame.sphere_count == 0
         && scene.swept_spheres.is_empty()
         && !scene.lights.iter().any(|l| l.side == 1);
+    scene.photons_per_ray = 0;
     if nothing_virtual {
         scene.pixels = vec![PixelInfo::uniform(PIXEL_OUT_OF_REACH); width * height];
         return;
@@ -47,6 +50,9 @@ pub fn pilot(scene: &mut PackedScene) {
         .into_par_iter()
         .map(|i| flags_of(scene, &Beam::of_pixel(&scene.frame, &pinhole, i as u32)))
         .collect();
+    if photons_traced(&scene.frame) {
+        scene.photons_per_ray = unmeasured(width * height);
+    }
     if scene.frame.estimator == ESTIMATOR_PAPER {
         scene.pixels = flags.into_iter().map(PixelInfo::uniform).collect();
         return;
@@ -74,7 +80,8 @@ pub fn pilot(scene: &mut PackedScene) {
             .map(|&importance| Rates::from_importance(importance))
             .collect()
     } else {
-        allocate(&blocks, &measure(scene, &blocks, &flags), &importances)
+        let measured = measure(scene, &blocks, &flags);
+        allocate(&blocks, &measured, &importances)
     };
     scene.pixels = flags
         .into_iter()
@@ -108,8 +115,25 @@ fn measure(
     scene.frame.flags &= !(FRAME_AOVS | FRAME_BOTH_SHADOWS);
     scene.pixels = flags.iter().copied().map(PixelInfo::uniform).collect();
     let measured = measurement::measure(scene, blocks);
+    if photons_traced(&scene.frame) {
+        scene.photons_per_ray = photons_per_ray(scene, eye_moments(blocks, &measured));
+    }
     scene.frame = frame;
     measured
+}
+
+/// What a sample in every pixel does.
+fn eye_moments(blocks: &Blocks, measured: &[measurement::BlockMoments]) -> EyeMoments {
+    let mut sum = EyeMoments::default();
+    for (block, moments) in measured.iter().enumerate() {
+        let sampled = moments.difference.pixels + moments.mixed.pixels;
+        if sampled > 0.0 {
+            let share = blocks.pixels(block).count() as f64 / f64::from(sampled);
+            sum.error += share * f64::from(moments.difference.error + moments.mixed.error);
+            sum.cost += share * f64::from(moments.difference.cost + moments.mixed.cost);
+        }
+    }
+    sum
 }
 
 #[cfg(test)]
