@@ -91,7 +91,8 @@ impl SplatSums {
         }
         let scale = pixels / self.photons as f64;
         let n = f64::from(sums.n);
-        let mut squares = value_of(self.sq, SQUARE_STEPS) * (scale * scale * n * (n - 1.0).max(1.0));
+        let mut squares =
+            value_of(self.sq, SQUARE_STEPS) * (scale * scale * n * (n - 1.0).max(1.0));
         let by_real = (f64::from(sums.n - sums.m), self.diff, &mut sums.diff);
         let by_virtual = (f64::from(sums.m), self.m_im, &mut sums.m_im);
         for (count, splats, sum) in [by_real, by_virtual] {

@@ -85,7 +85,11 @@ impl Photons {
         let list = SPLAT_BYTES * u64::from(LARGEST_BATCH);
         let filled = Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC;
         let batch_bytes = size_of::<PhotonBatch>() as u64;
-        let batch = make("photon batch", batch_bytes, Usage::UNIFORM | Usage::COPY_DST);
+        let batch = make(
+            "photon batch",
+            batch_bytes,
+            Usage::UNIFORM | Usage::COPY_DST,
+        );
         let counters = make("photon counters", COUNTERS_BYTES, filled);
         let splats = make("splats", list, Usage::STORAGE | Usage::COPY_SRC);
         let read = Usage::MAP_READ | Usage::COPY_DST;
@@ -122,7 +126,9 @@ impl Photons {
         let mut first = work.first;
         while first < work.end && !watcher.is_cancelled() {
             let of_sequence = (1 << SEQUENCE_BITS) - (first & ((1 << SEQUENCE_BITS) - 1));
-            let count = of_sequence.min(work.end - first).min(u64::from(self.next_batch));
+            let count = of_sequence
+                .min(work.end - first)
+                .min(u64::from(self.next_batch));
             let batch = PhotonBatch {
                 sequence: (first >> SEQUENCE_BITS) as u32,
                 first: (first & ((1 << SEQUENCE_BITS) - 1)) as u32,
@@ -183,7 +189,9 @@ impl Photons {
         encoder.copy_buffer_to_buffer(&self.splats, 0, &self.staging, 0, bytes);
         gpu.queue.submit([encoder.finish()]);
         gpu.check()?;
-        Ok(bytemuck::pod_collect_to_vec(&gpu.read(&self.staging, bytes)?))
+        Ok(bytemuck::pod_collect_to_vec(
+            &gpu.read(&self.staging, bytes)?,
+        ))
     }
 }
 

@@ -342,7 +342,16 @@ type Field<R, T, N> = (N, Box<dyn Fn(&R) -> T>, Box<dyn Fn(&mut R, T)>);
 fn splat_fields() -> impl Iterator<Item = Field<SplatSums, u32, String>> {
     const SUMS: usize = size_of::<SplatSums>() / size_of::<u64>();
     const NAMES: [&str; SUMS] = [
-        "diff.R", "diff.G", "diff.B", "m_im.R", "m_im.G", "m_im.B", "sq.R", "sq.G", "sq.B", "photons.Y",
+        "diff.R",
+        "diff.G",
+        "diff.B",
+        "m_im.R",
+        "m_im.G",
+        "m_im.B",
+        "sq.R",
+        "sq.G",
+        "sq.B",
+        "photons.Y",
     ];
     let word = |at: usize, shift: u32| -> Field<SplatSums, u32, String> {
         let (sum, axis) = NAMES[at].split_once('.').unwrap_or((NAMES[at], "Y"));

@@ -3,13 +3,13 @@
 use glam::Vec3;
 
 use crate::accel::covering_spheres;
+use crate::material::{is_smooth, transmits_unblurred};
 use crate::math::luminance;
 use crate::packed::{
-    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, Light,
-    MATERIAL_LAMBERTIAN, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
-    MAX_PHOTON_SPHERES, Material, NONE, PackedScene, xyz,
+    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, Light, MATERIAL_LAMBERTIAN,
+    MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, MAX_PHOTON_SPHERES, Material, NONE,
+    PackedScene, xyz,
 };
-use crate::material::{is_smooth, transmits_unblurred};
 
 /// Light of the environment brighter than so many times its mean is sent as photons: the sun, lamps and windows. The eye's paths find the rest
 /// well.
@@ -81,7 +81,11 @@ impl PackedScene {
             LIGHT_POINT | LIGHT_SPOT => brightness * solid_angles(xyz(light.position)),
             _ => {
                 let (u, v) = (xyz(light.axis_u), xyz(light.axis_v));
-                let half = if light.triangle == NONE { 0.5 } else { 1.0 / 3.0 };
+                let half = if light.triangle == NONE {
+                    0.5
+                } else {
+                    1.0 / 3.0
+                };
                 let centre = xyz(light.position) + (u + v) * half;
                 0.5 * brightness * f64::from(light.radiance[3]) * solid_angles(centre)
             }
@@ -95,7 +99,8 @@ fn is_smooth_somewhere(packed: &PackedScene, material: &Material) -> bool {
         return false;
     }
     let roughness = material.roughness * least_green(packed, material.metallic_roughness_texture);
-    let coat = material.clearcoat_roughness * least_green(packed, material.clearcoat_roughness_texture);
+    let coat =
+        material.clearcoat_roughness * least_green(packed, material.clearcoat_roughness_texture);
     let alpha = roughness * roughness;
     let mirrors = is_smooth(alpha)
         && (material.metallic > 0.0 || material.specular > 0.0 || material.transmission > 0.0);

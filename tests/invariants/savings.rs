@@ -236,6 +236,84 @@ fn cones_save_error_on_gloss_too(backend: BackendChoice) {
     assert!(with.cost() < without.cost());
 }
 
+/// Smooth things on a table under lights that the eye's paths find too.
+fn smooth_under(lights: &str, objects: &str, max_bounces: u32) -> Scene {
+    let mut scene = scene(&format!("{CAMERA}{LENS}{TABLE}{lights}{objects}"));
+    scene.settings.max_bounces = max_bounces;
+    scene.settings.rays_per_pixel = RAYS;
+    scene
+}
+
+const MIRROR_BALL: &str = r#"
+[[virtual]]
+shape = "sphere"
+segments = 48
+scale = 0.25
+translation = [0.1, 0.27, 0]
+material = { base_color = [0.9, 0.8, 0.7], metallic = 1.0, roughness = 0.0 }
+"#;
+
+const GLASS_BALL: &str = r#"
+[[virtual]]
+shape = "sphere"
+segments = 48
+scale = 0.25
+translation = [0.1, 0.3, 0]
+material = { base_color = [1, 0.9, 0.9], transmission = 1.0, roughness = 0.0, ior = 1.5, attenuation_color = [0.5, 0.8, 0.9], attenuation_distance_m = 0.5 }
+"#;
+
+/// A window pane, nearly upright between ball and camera or lamp.
+const PANE: &str = r#"
+[[virtual]]
+shape = "quad"
+corner = [-0.6, 0.01, 0.45]
+edge_u = [1.2, 0, 0]
+edge_v = [0, 0.9, -0.3]
+material = { base_color = [0.9, 1, 0.9], transmission = 1.0, roughness = 0.0, ior = 1.5 }
+"#;
+
+const COATED_BALL: &str = r#"
+[[virtual]]
+shape = "sphere"
+segments = 48
+scale = 0.25
+translation = [0.1, 0.27, 0]
+material = { base_color = [0.2, 0.3, 0.8], roughness = 0.7, clearcoat = 1.0, clearcoat_roughness = 0.0 }
+"#;
+
+/// A sphere that glows.
+const GLOWING: &str = r#"
+[[real]]
+shape = "sphere"
+segments = 16
+scale = 0.2
+translation = [-0.6, 1.2, 0.3]
+material = { base_color = [0, 0, 0], emissive = [12, 10, 8], specular = 0.0 }
+"#;
+
+fn photons_save_error(backend: BackendChoice) {
+    for (lights, objects, max_bounces) in [
+        (LAMP, MIRROR_BALL, 3),
+        (LAMP, GLASS_BALL, 5),
+        (LAMP, PANE, 3),
+        (LAMP, &[PANE, MIRROR_BALL].concat(), 4),
+        (LAMP, COATED_BALL, 3),
+        (GLOWING, MIRROR_BALL, 3),
+    ] {
+        let scene = smooth_under(lights, objects, max_bounces);
+        let pair = pair(&scene, backend, Skip::Photons, None, 64);
+        same_expectation(&pair, Skip::Photons);
+    }
+    let [with, without] = pair(
+        &smooth_under(LAMP, MIRROR_BALL, 3),
+        backend,
+        Skip::Photons,
+        None,
+        32,
+    );
+    assert!(with.cost() < without.cost());
+}
+
 /// At the first vertex of a path, at the second of a difference, and behind the ball.
 fn the_last_vertex_saves_rays(backend: BackendChoice) {
     for max_bounces in [1, 2] {
@@ -316,6 +394,7 @@ on_the_cpu!(
     cones_save_error,
     cones_save_error_on_gloss_too,
     the_last_vertex_saves_rays,
+    photons_save_error,
     adaptive_sampling_saves_rays,
     stopping_at_the_cameras_noise_saves_rays,
 );

@@ -9,9 +9,7 @@ use crate::cpu::state::SIDE_NONE;
 use crate::light::environment::{env_sample, share_left_to_eye};
 use crate::light::lights::spot_falloff;
 use crate::material::triangle_emission;
-use crate::math::{
-    PI, TAU, cross3, dot3, length3, orthonormal_basis, safe_sqrt, sincos_2pi,
-};
+use crate::math::{PI, TAU, cross3, dot3, length3, orthonormal_basis, safe_sqrt, sincos_2pi};
 use crate::packed::{
     Frame, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE,
     PackedScene, xyz,
@@ -98,12 +96,7 @@ pub fn emit(
     emission
 }
 
-fn emit_environment(
-    scene: &PackedScene,
-    choice: f32,
-    u: [f32; 2],
-    across: [f32; 2],
-) -> Emission {
+fn emit_environment(scene: &PackedScene, choice: f32, u: [f32; 2], across: [f32; 2]) -> Emission {
     let s = env_sample(scene, u[0], u[1]);
     let traced = 1.0 - share_left_to_eye(scene, s.direction);
     if s.pdf <= 0.0 || traced <= 0.0 {
@@ -312,4 +305,3 @@ fn aim_parallel(frame: &Frame, travel: Vec3, choice: f32, u: [f32; 2]) -> Aim {
         inv_pdf: total / count,
     }
 }
-

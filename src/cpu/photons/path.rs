@@ -68,7 +68,11 @@ pub struct PhotonNumber {
 }
 
 /// Follows a photon to its end and hands on what pixels receive; `rays` grows by what was traced.
-pub fn trace_photon(scene: &PackedScene, number: PhotonNumber, mut splat: impl FnMut(Splat)) -> PathState {
+pub fn trace_photon(
+    scene: &PackedScene,
+    number: PhotonNumber,
+    mut splat: impl FnMut(Splat),
+) -> PathState {
     let mut photon = begin(scene, number);
     if photon.flux == Vec3::ZERO {
         return photon.st;
@@ -129,7 +133,8 @@ fn begin(scene: &PackedScene, number: PhotonNumber) -> Photon {
     ray.direction = emission.direction;
     photon.distant = emission.distant;
     if scene.frame.flags & FRAME_ALPHA != 0 {
-        ray.opacity_seed = hash_combine(hash_combine(photon.key.seed, number.sequence), number.place);
+        ray.opacity_seed =
+            hash_combine(hash_combine(photon.key.seed, number.sequence), number.place);
     }
     photon
 }

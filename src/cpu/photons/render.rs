@@ -32,7 +32,10 @@ pub fn render(
         for (_, traced) in &tasks {
             rays += *traced;
         }
-        film.add_splats(end - first, tasks.into_iter().flat_map(|(splats, _)| splats));
+        film.add_splats(
+            end - first,
+            tasks.into_iter().flat_map(|(splats, _)| splats),
+        );
         first = end;
     }
     rays

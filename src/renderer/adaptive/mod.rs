@@ -93,7 +93,10 @@ impl Renderer {
             begin: stopwatch.begin,
             done: 0,
             expected: 2 * TRIAL_SCRAMBLES + SCRAMBLES,
-            planned: (core.packed.photons_per_ray, evaluations(&core.packed.pixels)),
+            planned: (
+                core.packed.photons_per_ray,
+                evaluations(&core.packed.pixels),
+            ),
             core,
         };
         let outcome = driver.pilot_and_picture();
