@@ -2,8 +2,6 @@
 
 #[path = "support/cpu_time.rs"]
 mod cpu_time;
-#[path = "support/displaced_sphere.rs"]
-mod displaced_sphere;
 #[path = "support/obvhs_peer.rs"]
 mod obvhs_peer;
 #[path = "support/workloads.rs"]

@@ -11,6 +11,8 @@ use clap::Parser;
 
 /// Inputs of a reader between two looks at the clock and the memory.
 const BATCH: u64 = 500;
+/// Between two lines that say how far it is.
+const TELL_EVERY: Duration = Duration::from_secs(60);
 /// Most memory that the process may ever have held.
 const MAX_BYTES: u64 = 2 << 30;
 
@@ -44,6 +46,7 @@ fn main() -> Result<(), String> {
     let mut counts = vec![fuzz::Counts::default(); fuzzers.len()];
     let mut seconds = vec![0.0; fuzzers.len()];
     let (mut first, mut total) = (arguments.first, 0);
+    let mut told = begin;
     while begin.elapsed() < time && total < arguments.inputs {
         for (index, fuzzer) in fuzzers.iter().enumerate() {
             let start = Instant::now();
@@ -56,6 +59,10 @@ fn main() -> Result<(), String> {
             total += BATCH;
         }
         first += BATCH;
+        if told.elapsed() >= TELL_EVERY {
+            told = Instant::now();
+            eprintln!("{total} inputs, up to number {first} of each reader");
+        }
     }
     for ((fuzzer, counts), seconds) in fuzzers.iter().zip(&counts).zip(&seconds) {
         println!(

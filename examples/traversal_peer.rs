@@ -5,8 +5,6 @@
 
 #[path = "../benches/support/cpu_time.rs"]
 mod cpu_time;
-#[path = "../benches/support/displaced_sphere.rs"]
-mod displaced_sphere;
 #[path = "../benches/support/obvhs_peer.rs"]
 mod obvhs_peer;
 #[path = "../benches/support/workloads.rs"]

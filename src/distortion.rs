@@ -1,4 +1,5 @@
-//! OpenCV's radial-tangential distortion, and its inverse: with proof that it is the right one, and fast.
+//! OpenCV's radial-tangential distortion, and its inverse: with proof that it is the right one, and fast. WGSL twin of what is fast:
+//! `shaders/distortion.wgsl`.
 //!
 //! Coordinates are normalised: x right, y down, at depth 1. Ideal coordinates are those of a pinhole, distorted ones those of the
 //! photograph. Far from the centre the polynomial folds back, so that several ideal points share one distorted point; only the

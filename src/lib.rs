@@ -70,6 +70,7 @@ pub mod output;
 pub mod pack;
 #[doc(hidden)]
 pub mod packed;
+mod refusal;
 #[doc(hidden)]
 pub mod renderer;
 #[doc(hidden)]
@@ -91,6 +92,8 @@ pub use film::{Film, MergeError, Picture, Planes, composite};
 pub use gpu::GpuError;
 #[doc(inline)]
 pub use output::{Format, Metadata, OutputError, PngBits, Target, write_exr, write_png};
+#[doc(inline)]
+pub use refusal::Refusal;
 #[doc(inline)]
 pub use renderer::{
     Budget, CameraNoise, ErrorGoal, FrameEdit, RenderError, Renderer, RendererOptions, Skip, Stats,

@@ -16,7 +16,8 @@
 //!
 //! In `src/material/thing.rs`, that gives the two Rust items and, to `shaders/material/thing.wgsl` or in its place, the constant and the
 //! struct that other shaders import as `package::material::thing::Thing`. Records are `#[repr(C)]`; one whose fields lie elsewhere in WGSL
-//! (a `vec3` begins at multiples of 16 bytes) does not compile until it is padded by hand. A file has one `shared!` block, and
+//! (a `vec3` begins at multiples of 16 bytes) does not compile until it is padded by hand. What lies in no buffer, and is only passed and
+//! returned, is declared as `value struct`: either side lays it out as it likes, and it may hold `bool`. A file has one `shared!` block, and
 //! [`Composer`](crate::gpu::Composer) is told of its `SHARED`.
 
 use std::fmt::Write;
@@ -88,6 +89,8 @@ pub struct Field {
 /// One record.
 pub struct Record {
     pub name: &'static str,
+    /// Lies in no buffer.
+    pub is_value: bool,
     /// Bytes.
     pub size: usize,
     pub fields: &'static [Field],
@@ -130,6 +133,12 @@ impl Module {
     }
 }
 
+/// Full path in the shaders' package of a record that is declared in a Rust module.
+pub(crate) fn path_of(rust_module: &str, record: &str) -> String {
+    let module = rust_module.split_once("::").map_or("", |(_, path)| path);
+    format!("package::{module}::{record}")
+}
+
 /// WGSL's `array<T, N>`, for a field that Rust holds as `[T; N]` and that is not meant to be a vector: `field: [f32; 3] as Array<f32, 3>`.
 pub struct Array<T, const N: usize>(std::marker::PhantomData<T>);
 
@@ -168,6 +177,7 @@ macro_rules! plain_types {
 plain_types! {
     u32: 4 4 "u32",
     i32: 4 4 "i32",
+    bool: 1 1 "bool",
     f32: 4 4 "f32",
     [f32; 2]: 8 8 "vec2<f32>",
     [f32; 3]: 16 12 "vec3<f32>",
@@ -225,7 +235,7 @@ impl<const N: usize> SharedValue for [u32; N] {
 /// Declares constants and records for both sides; see the module's text.
 macro_rules! shared {
     // The end: all names are known.
-    (@item [$($constant:ident)*] [$(($record:ident $($field:ident: ($($kind:tt)*),)*))*]) => {
+    (@item [$($constant:ident)*] [$(($record:ident $is_value:literal $($field:ident: ($($kind:tt)*),)*))*]) => {
         /// What this file shares with the shaders.
         pub(crate) const SHARED: $crate::shared::Module = $crate::shared::Module {
             rust_path: module_path!(),
@@ -235,6 +245,7 @@ macro_rules! shared {
             },)*],
             records: &[$($crate::shared::Record {
                 name: stringify!($record),
+                is_value: $is_value,
                 size: size_of::<$record>(),
                 fields: &[$($crate::shared::Field {
                     name: stringify!($field),
@@ -274,8 +285,7 @@ macro_rules! shared {
             const SIZE: usize = size_of::<Self>();
 
             fn wgsl() -> String {
-                let module = module_path!().split_once("::").map_or("", |(_, path)| path);
-                format!("package::{module}::{}", stringify!($name))
+                $crate::shared::path_of(module_path!(), stringify!($name))
             }
         }
 
@@ -297,7 +307,28 @@ macro_rules! shared {
         };
 
         shared!(@item $constants
-            [$($records)* ($name $($field: ($kind $(as $wgsl)?),)*)] $($rest)*);
+            [$($records)* ($name false $($field: ($kind $(as $wgsl)?),)*)] $($rest)*);
+    };
+    (@item $constants:tt [$($records:tt)*]
+        $(#[$meta:meta])* $vis:vis value struct $name:ident {
+            $($(#[$field_meta:meta])* $field_vis:vis $field:ident: $kind:ty),* $(,)?
+        } $($rest:tt)*
+    ) => {
+        $(#[$meta])*
+        $vis struct $name {
+            $($(#[$field_meta])* $field_vis $field: $kind,)*
+        }
+
+        impl $crate::shared::Shared for $name {
+            const ALIGN: usize = align_of::<Self>();
+            const SIZE: usize = size_of::<Self>();
+
+            fn wgsl() -> String {
+                $crate::shared::path_of(module_path!(), stringify!($name))
+            }
+        }
+
+        shared!(@item $constants [$($records)* ($name true $($field: ($kind),)*)] $($rest)*);
     };
     (@wgsl $kind:ty) => { $kind };
     (@wgsl $kind:ty as $wgsl:ty) => { $wgsl };

@@ -155,3 +155,23 @@ fn every_command_that_reads_scenes_has_it() {
         "sequence scene/scene.toml --sandbox --frames scene/in --trajectory poses.json -o out",
     );
 }
+
+/// A film says where its scene is by the way from its own folder, which may be anybody's.
+#[test]
+fn a_film_is_not_followed_out_of_its_folder() {
+    let folder = folder();
+    folder.write("scene/scene.toml", scene("", ""));
+    folder.create("films");
+    folder.succeed("render scene/scene.toml --rpp 4 --range 0..2 -o films/part.exr");
+    let merge = "merge films/part.exr -o out.png";
+    let output = folder.run(&format!("{merge} --sandbox"));
+    assert_refused(&output, "scene.toml");
+    assert!(stderr(&output).contains("outside the film's folder"));
+    for line in [
+        merge.to_owned(),
+        format!("{merge} --sandbox --scene scene/scene.toml"),
+    ] {
+        folder.succeed(&line);
+        folder.remove("out.png");
+    }
+}

@@ -1,12 +1,10 @@
 //! A tree over a bumpy sphere of 1e3 to 1e6 triangles, on one thread: from corners to what the CPU traverses.
 
-#[path = "../support/displaced_sphere.rs"]
-mod displaced_sphere;
-
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput};
 use mixray::accel::WorldBvh;
+use mixray::bench::stress::meshes::bumpy_sphere;
 
 use crate::processor_time::ProcessorTime;
 
@@ -21,7 +19,7 @@ pub fn builds(criterion: &mut Criterion<ProcessorTime>) {
     let mut group = criterion.benchmark_group("build");
     group.sampling_mode(SamplingMode::Flat);
     for (rings, segments) in GRIDS {
-        let triangles = displaced_sphere::displaced_sphere(rings, segments);
+        let triangles = bumpy_sphere(rings, segments);
         let count = triangles.len();
         group.throughput(Throughput::Elements(count as u64));
         group.bench_with_input(BenchmarkId::from_parameter(count), &triangles, |b, t| {

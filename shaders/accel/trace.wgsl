@@ -4,6 +4,7 @@
 // The tree is the compressed wide BVH of Ylitie, Karras and Laine (HPG 2017), made in src/accel/compressed.rs.
 
 import package::gpu::buffers::{bvh_leaves, bvh_nodes, frame};
+import package::packed::records::SIDE_VIRTUAL;
 import package::shared::{NONE, WORKGROUP};
 
 // A hit counts if t > t_min, or t == t_min and its id is larger than skip, and if t < t_max.
@@ -56,16 +57,16 @@ fn child_bit_index(meta4: u32, octant: u32) -> u32 {
     return (meta4 ^ (octant & inner_mask)) & 0x1f1f1f1fu;
 }
 
-// `world`: 0 real, 1 virtual. `thread`: local invocation index, which picks a part of the stack.
+// `world`: SIDE_REAL or SIDE_VIRTUAL. `thread`: local invocation index, which picks a part of the stack.
 fn trace(ray: Ray, world: u32, any_hit: bool, thread: u32) -> Hit {
     var hit = Hit(infinity(), 0.0, 0.0, NONE);
     let extent = max(max(abs(ray.direction.x), abs(ray.direction.y)), abs(ray.direction.z));
     if !is_finite3(ray.origin) || !is_finite3(ray.direction) || extent == 0.0 || !(ray.t_min < ray.t_max) {
         return hit;
     }
-    let node_base = select(0u, frame.virtual_node_base, world == 1u);
-    let leaf_base = select(0u, frame.virtual_leaf_base, world == 1u);
-    let node_end = select(frame.virtual_node_base, arrayLength(&bvh_nodes) / 5u, world == 1u);
+    let node_base = select(0u, frame.virtual_node_base, world == SIDE_VIRTUAL);
+    let leaf_base = select(0u, frame.virtual_leaf_base, world == SIDE_VIRTUAL);
+    let node_end = select(frame.virtual_node_base, arrayLength(&bvh_nodes) / 5u, world == SIDE_VIRTUAL);
     if node_base >= node_end {
         return hit;
     }

@@ -4,19 +4,7 @@ import package::gpu::buffers::frame;
 import package::packed::records::{APERTURE_DISC, APERTURE_SQUARE};
 import package::math::{INV_TAU, dot3, normalize3, sincos_2pi};
 import package::camera::shutter::{CameraPose, camera_pose};
-import package::distortion::UNDISTORT_STEPS;
-
-struct CameraRay {
-    origin: vec3<f32>,
-    direction: vec3<f32>,
-}
-
-struct Projection {
-    px: f32,
-    py: f32,
-    depth: f32,
-    valid: bool,
-}
+import package::distortion::{distort, undistort_fast};
 
 fn sample_lens(u: f32, v: f32) -> vec2<f32> {
     let radius = frame.aperture_radius;
@@ -93,46 +81,16 @@ fn camera_project(position: vec3<f32>) -> Projection {
 }
 
 fn lens_distort(x: f32, y: f32) -> vec2<f32> {
-    let k1 = frame.distortion.x;
-    let k2 = frame.distortion.y;
-    let p1 = frame.distortion.z;
-    let p2 = frame.distortion.w;
-    let k3 = frame.distortion_k3;
-    let r2 = x * x + y * y;
-    let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    return vec2<f32>(
-        x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-        y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-    );
+    return distort(coefficients(), vec2<f32>(x, y));
 }
 
 fn lens_undistort(xd: f32, yd: f32) -> vec2<f32> {
-    let k1 = frame.distortion.x;
-    let k2 = frame.distortion.y;
-    let p1 = frame.distortion.z;
-    let p2 = frame.distortion.w;
-    let k3 = frame.distortion_k3;
-    if k1 == 0.0 && k2 == 0.0 && p1 == 0.0 && p2 == 0.0 && k3 == 0.0 {
-        return vec2<f32>(xd, yd);
-    }
-    var x = xd;
-    var y = yd;
-    for (var i = 0u; i < UNDISTORT_STEPS; i++) {
-        let at = lens_distort(x, y);
-        let ex = at.x - xd;
-        let ey = at.y - yd;
-        let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        let slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
-        let jxx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x;
-        let jxy = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
-        let jyy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
-        let determinant = jxx * jyy - jxy * jxy;
-        let inverse = 1.0 / max(determinant, 1e-4);
-        x -= clamp((jyy * ex - jxy * ey) * inverse, -0.5, 0.5);
-        y -= clamp((jxx * ey - jxy * ex) * inverse, -0.5, 0.5);
-    }
-    return vec2<f32>(x, y);
+    return undistort_fast(coefficients(), vec2<f32>(xd, yd));
+}
+
+fn coefficients() -> array<f32, 5> {
+    let k = frame.distortion;
+    return array<f32, 5>(k.x, k.y, k.z, k.w, frame.distortion_k3);
 }
 
 fn lens_area(x: f32, y: f32) -> f32 {

@@ -3,14 +3,6 @@
 import package::packed::records::{SAMPLER_CMJ, SAMPLER_JITTERED};
 import package::math::{hash_combine, hash_u32, uniform_from_bits};
 
-struct SampleKey {
-    pixel: u32,
-    index: u32,
-    total: u32,
-    seed: u32,
-    sampler: u32,
-}
-
 // The four numbers of one set, computed when they are asked for.
 struct SampleSet {
     key: SampleKey,
@@ -97,13 +89,6 @@ fn strata_columns(total: u32) -> u32 {
         n -= 1u;
     }
     return n;
-}
-
-// Cells that share the unit square among a pixel's samples.
-struct Grid {
-    columns: u32,
-    rows: u32,
-    correlated: bool,
 }
 
 fn grid_point(grid: Grid, stream: u32, index: u32, jitter: u32) -> vec2<u32> {

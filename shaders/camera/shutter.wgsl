@@ -4,14 +4,6 @@ import package::gpu::buffers::frame;
 import package::packed::records::{FRAME_SHUTTER_ORDERED, SHUTTER_POSES};
 import package::camera::sampler::{SampleKey, sample_4d};
 
-
-struct CameraPose {
-    position: vec3<f32>,
-    right: vec3<f32>,
-    up: vec3<f32>,
-    back: vec3<f32>,
-}
-
 fn camera_pose() -> CameraPose {
     return CameraPose(
         frame.camera_position.xyz,

@@ -13,7 +13,7 @@ import package::math::{dot3, hash_combine, hash_u32};
 import package::camera::sampler::sample_4d;
 import package::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
 import package::cpu::state::{
-    COINCIDENCE, DELTA_DENSITY, EVENT_SCATTERED, FAR, FirstHit, Hits, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE,
+    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_SCATTERED, FAR, FirstHit, Hits, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE,
     PENDING_NEXT, PENDING_REAL, PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED,
     REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_VIRTUAL, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
     REQUEST_VIRTUAL_THEN_REAL, RealPath, STAGE_DIFFERENCE_BSDF, STAGE_DIFFERENCE_CONE, STAGE_DIFFERENCE_SHADOW, STAGE_DONE,
@@ -180,7 +180,8 @@ fn resume(st: ptr<function, PathState>) {
             (*st).path.pending &= ~PENDING_NEXT;
             follow(st, path_nexts[lane]);
             if (*st).path.mode == MODE_DIFFERENCE {
-                (*st).path.events = events_after((*st).path.events, (*st).ray.depth, (*st).ray.side, false);
+                let smooth_ = ((*st).path.events & EVENT_AT_POLISHED) != 0u;
+                (*st).path.events = events_after((*st).path.events, (*st).ray.depth, (*st).ray.side, smooth_);
                 (*st).path.stage = STAGE_DIFFERENCE_CONE;
                 (*st).ray.request = REQUEST_VIRTUAL_THEN_REAL;
             } else {

@@ -1,7 +1,7 @@
 // Answers a sample's ray request. Rust twin: src/cpu/request.rs.
 
 import package::gpu::buffers::{frame, materials, triangles};
-import package::packed::records::{FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_MASK, MATERIAL_ALPHA_BLEND};
+import package::packed::records::{FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, SIDE_REAL, SIDE_VIRTUAL};
 import package::shared::NONE;
 import package::math::{dot3, hash_combine, length3, uniform_from_bits};
 import package::cpu::state::{
@@ -12,19 +12,8 @@ import package::cpu::state::{
 import package::accel::trace::{Hit, Ray, trace};
 @if(alpha) import package::material::surface::surface_alpha;
 
-// One query of a request: a world (QUERY_NONE: the request is answered) and how far.
-struct Query {
-    world: u32,
-    any_hit: bool,
-    t_max: f32,
-    // The answer goes to the real world's hit rather than the virtual one's.
-    to_real: bool,
-    // With it the request is answered.
-    is_last: bool,
-}
-
 fn query(world: u32, any_hit: bool, t_max: f32, is_last: bool) -> Query {
-    return Query(world, any_hit, t_max, world == WORLD_REAL, is_last);
+    return Query(world, any_hit, t_max, world == SIDE_REAL, is_last);
 }
 
 // The request as a sequence of at most three queries, so that a kernel has one trace call site; `hits`: what the earlier ones met.
@@ -33,43 +22,43 @@ fn next_query(request: u32, step: u32, t_max: f32, hits: Hits) -> Query {
     let met_virtual = hits.in_virtual.triangle != NONE;
     switch request {
         case REQUEST_CLOSEST_VIRTUAL: {
-            if step == 0u { return query(WORLD_VIRTUAL, false, t_max, true); }
+            if step == 0u { return query(SIDE_VIRTUAL, false, t_max, true); }
         }
         case REQUEST_CLOSEST_REAL: {
-            if step == 0u { return query(WORLD_REAL, false, t_max, true); }
+            if step == 0u { return query(SIDE_REAL, false, t_max, true); }
         }
         case REQUEST_CLOSEST_MIXED: {
-            if step == 0u { return query(WORLD_VIRTUAL, false, t_max, false); }
-            if step == 1u { return query(WORLD_REAL, false, hits.in_virtual.t, true); }
+            if step == 0u { return query(SIDE_VIRTUAL, false, t_max, false); }
+            if step == 1u { return query(SIDE_REAL, false, hits.in_virtual.t, true); }
         }
         case REQUEST_CLOSEST_EACH: {
-            if step == 0u { return query(WORLD_VIRTUAL, false, t_max, false); }
-            if step == 1u { return query(WORLD_REAL, false, t_max, true); }
+            if step == 0u { return query(SIDE_VIRTUAL, false, t_max, false); }
+            if step == 1u { return query(SIDE_REAL, false, t_max, true); }
         }
         case REQUEST_VIRTUAL_THEN_REAL: {
-            if step == 0u { return query(WORLD_VIRTUAL, false, t_max, false); }
-            if step == 1u && met_virtual { return query(WORLD_REAL, false, t_max, true); }
+            if step == 0u { return query(SIDE_VIRTUAL, false, t_max, false); }
+            if step == 1u && met_virtual { return query(SIDE_REAL, false, t_max, true); }
         }
         case REQUEST_REAL_UNLESS_COVERED: {
-            if step == 0u { return query(WORLD_REAL, false, t_max, false); }
+            if step == 0u { return query(SIDE_REAL, false, t_max, false); }
             let covering = hits.in_real.t * (1.0 + COINCIDENCE);
-            if step == 1u && met_real { return query(WORLD_VIRTUAL, true, covering, true); }
+            if step == 1u && met_real { return query(SIDE_VIRTUAL, true, covering, true); }
         }
         case REQUEST_SHADOW_MIXED: {
-            if step == 0u { return query(WORLD_VIRTUAL, true, t_max, false); }
-            if step == 1u && !met_virtual { return query(WORLD_REAL, true, t_max, true); }
+            if step == 0u { return query(SIDE_VIRTUAL, true, t_max, false); }
+            if step == 1u && !met_virtual { return query(SIDE_REAL, true, t_max, true); }
         }
         case REQUEST_SHADOW_REAL: {
-            if step == 0u { return query(WORLD_REAL, true, t_max, true); }
+            if step == 0u { return query(SIDE_REAL, true, t_max, true); }
         }
         case REQUEST_SHADOW_DIFFERENCE: {
-            if step == 0u { return query(WORLD_VIRTUAL, true, t_max, false); }
-            if step == 1u && (met_virtual || asks_both()) { return query(WORLD_REAL, true, t_max, true); }
+            if step == 0u { return query(SIDE_VIRTUAL, true, t_max, false); }
+            if step == 1u && (met_virtual || asks_both()) { return query(SIDE_REAL, true, t_max, true); }
         }
         case REQUEST_SHADOW_PAIR: {
-            if step == 0u { return query(WORLD_REAL, true, t_max, false); }
-            if step == 1u { return query(WORLD_VIRTUAL, true, t_max, false); }
-            if step == 2u && !met_virtual { return Query(WORLD_REAL, true, t_max, false, true); }
+            if step == 0u { return query(SIDE_REAL, true, t_max, false); }
+            if step == 1u { return query(SIDE_VIRTUAL, true, t_max, false); }
+            if step == 2u && !met_virtual { return Query(SIDE_REAL, true, t_max, false, true); }
         }
         default: {}
     }
@@ -161,7 +150,7 @@ fn ray_into(ray: PathRay, world: u32, t_max: f32) -> Ray {
     var shift = -offset * ray.origin.coincidence_ratio;
     if world == ray.side {
         shift = select(offset, -offset, dot3(ray.direction, offset) < 0.0);
-    } else if world == WORLD_REAL {
+    } else if world == SIDE_REAL {
         shift = offset * ray.origin.coincidence_ratio;
     }
     var direction = ray.direction;
@@ -171,7 +160,7 @@ fn ray_into(ray: PathRay, world: u32, t_max: f32) -> Ray {
         distance = length3(to_end);
         direction = to_end / max(distance, MIN_POSITIVE);
     }
-    let t_min = select(0.0, ray.origin.real_t_min, world == WORLD_REAL);
+    let t_min = select(0.0, ray.origin.real_t_min, world == SIDE_REAL);
     return Ray(ray.origin.position + shift, t_min, direction, distance, NONE);
 }
 

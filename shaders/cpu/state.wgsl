@@ -2,14 +2,7 @@
 
 import package::shared::NONE;
 import package::accel::trace::Hit;
-
-struct RayCounts {
-    primary: u32,
-    mixed: u32,
-    real: u32,
-    mixed_shadow: u32,
-    real_shadow: u32,
-}
+import package::work::rays::SampleRays;
 
 // The parts of the samples in flight, by lane.
 @group(2) @binding(0) var<storage, read_write> path_rays: array<PathRay>;
@@ -29,7 +22,7 @@ struct PathState {
     hits: Hits,
     path: Path,
     vertex_hit: Hit,
-    rays: RayCounts,
+    rays: SampleRays,
 }
 
 const MISS: Hit = Hit(FAR, 0.0, 0.0, NONE);

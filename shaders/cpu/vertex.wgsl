@@ -2,21 +2,22 @@
 
 import package::gpu::buffers::{frame, lights, materials};
 import package::packed::records::{
-    FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED,
-    MATERIAL_UNLIT,
+    FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, LIGHT_ENVIRONMENT, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED,
+    MATERIAL_UNLIT, SIDE_REAL, SIDE_VIRTUAL,
 };
 import package::shared::NONE;
-import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_passes_straight, bsdf_sample};
+import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample};
 import package::camera::sampler::{SampleSet, fourth, pair, second_pair, third};
 import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres};
-import package::cpu::contribution::{accumulate, density_weight, draw, events_after, left_to_photons};
+import package::cpu::contribution::{accumulate, density_weight, draw, events_after, left_to_photons, vertex_left_to_photons};
+import package::light::environment::share_left_to_eye;
 import package::cpu::contribution::{
     SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
 };
 import package::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 import package::math::{dot3, exp_, safe_sqrt};
 import package::cpu::state::{
-    COINCIDENCE, DELTA_DENSITY, DifferenceRay, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
+    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, DifferenceRay, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
     PENDING_SHADOW, PathState, REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED,
     REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL, RayOrigin, Segment, path_differences, path_nexts,
 };
@@ -63,6 +64,7 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     }
     stand_at(st, s, distance);
 
+    if difference && bsdf_is_polished(s) { (*st).path.events |= EVENT_AT_POLISHED; }
     // Those of a path are played for certain.
     var techniques = Techniques(0.0, 1.0);
     @if(!paper) {
@@ -78,7 +80,7 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
 
 fn stand_at(st: ptr<function, PathState>, s: Surface, distance: f32) {
     let side = select(0u, 1u, (*st).vertex_hit.triangle >= frame.real_triangle_count);
-    let leaves_coinciding_real = side == 1u && (*st).ray.side == 0u && coincides(st, s, distance);
+    let leaves_coinciding_real = side == SIDE_VIRTUAL && (*st).ray.side == SIDE_REAL && coincides(st, s, distance);
     let reach = 1.0 + COINCIDENCE * distance / s.error;
     (*st).ray.origin = RayOrigin(
         s.position,
@@ -152,17 +154,25 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, technique
         index = light_select(choice_coin.x, choice_coin.y);
     }
     let l = light_sample(index, s.position, pair(u));
-    let contribution = light_contribution(st, s, wo, techniques, l);
+    var contribution = light_contribution(st, s, wo, techniques, l);
+    @if(photons) {
+        if vertex_left_to_photons(st, s) { contribution *= light_left_to_eye(index, l.direction); }
+    }
     if any(contribution != vec3<f32>(0.0)) {
         plan_shadow(st, s, l, contribution);
     }
+}
+
+fn light_left_to_eye(index: u32, direction: vec3<f32>) -> f32 {
+    if lights[index].kind == LIGHT_ENVIRONMENT { return share_left_to_eye(direction); }
+    return select(1.0, 0.0, lights[index].photon_pdf > 0.0);
 }
 
 fn light_contribution(
     st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques, l: LightSample,
 ) -> vec3<f32> {
     let difference = is_difference(st);
-    let real_light = l.side == 0u;
+    let real_light = l.side == SIDE_REAL;
     if l.pdf <= 0.0 || ((*st).path.mode == MODE_REAL && !real_light) { return vec3<f32>(0.0); }
     @if(!paper) {
         let asks_both = (frame.flags & FRAME_BOTH_SHADOWS) != 0u;
@@ -193,7 +203,7 @@ fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample, contrib
     if l.distance < FAR {
         (*st).ray.t_max = l.distance - SHADOW_SHORTEN * l.distance - SHADOW_SHORTEN_ERRORS * s.error;
     }
-    let real_light = l.side == 0u;
+    let real_light = l.side == SIDE_REAL;
     var request = REQUEST_SHADOW_MIXED;
     if is_difference(st) && real_light { request = REQUEST_SHADOW_DIFFERENCE; }
     if (*st).path.mode == MODE_REAL { request = REQUEST_SHADOW_REAL; }
@@ -247,7 +257,8 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
     if !b.valid { return; }
     var events = (*st).path.events;
     if !(b.delta && b.transmitted && bsdf_passes_straight(s)) {
-        events = events_after(events, (*st).ray.depth, (*st).ray.side, b.delta);
+        let smooth_ = b.delta || bsdf_is_polished(s);
+        events = events_after(events, (*st).ray.depth, (*st).ray.side, smooth_);
     }
     var segment = Segment(
         b.wi,

@@ -1,6 +1,7 @@
 // The packed scene: bind group 0 of every kernel. Host: src/gpu/buffers.rs.
 
-import package::packed::records::{Frame, Light, Material, PixelInfo, TextureRef, Triangle, Vertex};
+import package::packed::materials::Material;
+import package::packed::records::{Frame, Light, PixelInfo, TextureRef, Triangle, Vertex};
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> triangles: array<Triangle>;

@@ -10,8 +10,9 @@ import package::gpu::lanes::{
     COUNT_IN, COUNT_OUT, COUNT_STEPS,
 };
 import package::cpu::request::answer;
+import package::work::rays::SampleRays;
 import package::cpu::state::{
-    FAR, PathResult, PathState, REQUEST_CLOSEST_REAL, RayCounts, STAGE_DONE, path_first_hits, path_hits, path_radiances_real, path_rays,
+    FAR, PathResult, PathState, REQUEST_CLOSEST_REAL, STAGE_DONE, path_first_hits, path_hits, path_radiances_real, path_rays,
     path_results, paths,
 };
 
@@ -19,12 +20,12 @@ import package::cpu::state::{
 fn kernel_generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     let lane = id.x;
     var alive = false;
-    var rays: RayCounts;
+    var rays: SampleRays;
     if lane < batch.lane_count {
         let item = work[lane % batch.pixel_count];
-        let index = item.y + batch.sample_offset + lane / batch.pixel_count;
-        if index < item.z {
-            let st = begin_sample(lane, item.x, index, batch.real_pass != 0u);
+        let index = item.first + batch.sample_offset + lane / batch.pixel_count;
+        if index < item.end {
+            let st = begin_sample(lane, item.pixel, index, batch.real_pass != 0u);
             rays = st.rays;
             path_results[lane] = PathResult(vec3<f32>(0.0), 0u);
             @if(paper) { path_radiances_real[lane] = vec3<f32>(0.0); }
@@ -101,8 +102,8 @@ fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>) {
         let item = work[slot];
         var sums = pixel_sums[slot];
         for (var k = 0u; k < batch.sample_count; k++) {
-            let index = item.y + batch.sample_offset + k;
-            if index >= item.z {
+            let index = item.first + batch.sample_offset + k;
+            if index >= item.end {
                 break;
             }
             let lane = k * batch.pixel_count + slot;

@@ -1,11 +1,12 @@
 // A batch of samples in flight: one lane each, its state in the arrays of cpu/state.wgsl, the lanes that still want a ray in a queue.
 
-import package::cpu::state::RayCounts;
+import package::work::list::PixelWork;
+import package::work::rays::SampleRays;
 import package::film::sums::{PixelSums, GuideSums};
 
 @group(1) @binding(0) var<uniform> batch: Batch;
-// Pixel, first sample, end of the samples, by slot.
-@group(1) @binding(1) var<storage, read> work: array<vec4<u32>>;
+// By slot.
+@group(1) @binding(1) var<storage, read> work: array<PixelWork>;
 @group(1) @binding(2) var<storage, read> queue_in: array<u32>;
 @group(1) @binding(3) var<storage, read_write> queue_out: array<u32>;
 @group(1) @binding(4) var<storage, read_write> counters: array<atomic<u32>, COUNTERS>;
@@ -40,7 +41,7 @@ fn append(lane: u32, alive: bool, thread: u32) {
 var<workgroup> counted: array<atomic<u32>, RAY_KINDS>;
 
 // Counts rays that this thread has traced. All threads of the workgroup call it.
-fn add_rays(rays: RayCounts, thread: u32) {
+fn add_rays(rays: SampleRays, thread: u32) {
     if thread < RAY_KINDS {
         atomicStore(&counted[thread], 0u);
     }

@@ -3,14 +3,6 @@
 import package::gpu::buffers::frame;
 import package::math::{PI, cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
 
-struct Cone {
-    axis: vec3<f32>,
-    sin2: f32,
-    one_minus_cos: f32,
-    wide: bool,
-    weight: f32,
-}
-
 fn cone_of(i: u32, position: vec3<f32>, ns: vec3<f32>) -> Cone {
     let sphere = frame.spheres[i];
     let to_centre = sphere.xyz - position;
@@ -44,11 +36,6 @@ fn cones_at(position: vec3<f32>, ns: vec3<f32>) -> Cones {
         seen.total += cone_of(i, position, ns).weight;
     }
     return seen;
-}
-
-struct ConeSample {
-    direction: vec3<f32>,
-    pdf: f32,
 }
 
 fn cone_sample(cones: Cones, choice: f32, u: vec2<f32>) -> ConeSample {

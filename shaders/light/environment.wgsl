@@ -4,12 +4,6 @@ import package::gpu::buffers::frame;
 @if(environment_map) import package::gpu::buffers::{env_cdf, env_texels};
 import package::math::{PI, atan2_, luminance, safe_sqrt, sincos_2pi};
 
-struct EnvSample {
-    direction: vec3<f32>,
-    radiance: vec3<f32>,
-    pdf: f32,
-}
-
 @if(environment_map)
 fn env_coordinates(direction: vec3<f32>) -> vec2<f32> {
     let x = direction.x * frame.env_cos - direction.z * frame.env_sin;
@@ -23,17 +17,6 @@ fn env_coordinates(direction: vec3<f32>) -> vec2<f32> {
 fn env_texel(i: u32, j: u32) -> vec3<f32> {
     let at = 3u * (j * frame.env_width + i);
     return vec3<f32>(env_texels[at], env_texels[at + 1u], env_texels[at + 2u]);
-}
-
-@if(environment_map)
-struct Neighbours {
-    c00: vec3<f32>,
-    c10: vec3<f32>,
-    c01: vec3<f32>,
-    c11: vec3<f32>,
-    fx: f32,
-    fy: f32,
-    row: f32,
 }
 
 @if(environment_map)

@@ -9,15 +9,6 @@ import package::cpu::state::FAR;
 @if(area_lights) import package::light::rectangle::{rectangle_from, sample_rectangle};
 @if(area_lights) import package::material::surface::triangle_emission;
 
-struct LightSample {
-    direction: vec3<f32>,
-    distance: f32,
-    radiance: vec3<f32>,
-    pdf: f32,
-    delta: bool,
-    side: u32,
-}
-
 fn no_light() -> LightSample {
     return LightSample(vec3<f32>(0.0, 0.0, 1.0), 0.0, vec3<f32>(0.0), 0.0, false, SIDE_REAL);
 }

@@ -3,20 +3,6 @@
 import package::packed::records::{LIGHT_QUAD, Light};
 import package::math::{INV_TAU, TAU, atan2_, cross3, dot3, length3, safe_sqrt, sincos_2pi};
 
-
-struct Rectangle {
-    ex: vec3<f32>,
-    ey: vec3<f32>,
-    ez: vec3<f32>,
-    x0: f32,
-    x1: f32,
-    y0: f32,
-    y1: f32,
-    height: f32,
-    solid_angle: f32,
-    start: f32,
-}
-
 fn is_right_angle(ex: vec3<f32>, ey: vec3<f32>) -> bool {
     return abs(dot3(ex, ey)) <= RIGHT_ANGLE;
 }

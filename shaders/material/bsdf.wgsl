@@ -1,34 +1,15 @@
 // Twin of src/material/bsdf.rs: the same operations in the same order.
 
-import package::packed::records::MATERIAL_LAMBERTIAN;
-import package::material::fresnel::{fresnel_dielectric, refract_about};
-import package::material::ggx::{ggx_reflect, ggx_refract, ggx_sample_half, GgxEval};
-import package::material::lobes::{
-    Lobes, NO_ALBEDO, coat_delta, cos_to, diffuse_albedo, diffuse_color, grazing_albedo, interface_at, lambert_cos, lobes_at, max3,
-    opaque_fresnel, reflects_delta, scatters_nothing, surface_index, thin_walled, transmits_delta,
-};
-import package::math::{INV_PI, dot3, orthonormal_basis, sincos_2pi};
-import package::material::normal::unit;
+import package::packed::records::{MATERIAL_LAMBERTIAN, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT};
+import package::material::interface::{max3, surface_index, thin_walled};
+import package::material::lobes::{lobes_albedo, lobes_are_delta, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample};
+import package::material::scatter::{BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, lambert_cos, sample_lambert};
+import package::math::INV_PI;
 import package::material::surface::Surface;
 
-
-struct BsdfEval {
-    f_cos: vec3<f32>,
-    pdf: f32,
+fn scatters_nothing(s: Surface) -> bool {
+    return (s.flags & (MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT)) != 0u;
 }
-
-const EVAL_NOTHING = BsdfEval(vec3<f32>(0.0, 0.0, 0.0), 0.0);
-
-struct BsdfSample {
-    wi: vec3<f32>,
-    weight: vec3<f32>,
-    pdf: f32,
-    delta: bool,
-    transmitted: bool,
-    valid: bool,
-}
-
-const SAMPLE_NOTHING = BsdfSample(vec3<f32>(0.0, 0.0, 1.0), vec3<f32>(0.0, 0.0, 0.0), 0.0, false, false, false);
 
 fn bsdf_eval(s: Surface, wo: vec3<f32>, wi: vec3<f32>) -> BsdfEval {
     if scatters_nothing(s) {
@@ -36,106 +17,11 @@ fn bsdf_eval(s: Surface, wo: vec3<f32>, wi: vec3<f32>) -> BsdfEval {
     }
     @if(rough_specular) {
         if !bsdf_is_lambertian(s) {
-            return eval_with(s, lobes_at(s, wo), wo, wi);
+            return lobes_eval(s, wo, wi);
         }
     }
     let pdf = lambert_cos(s, wi) * INV_PI;
     return BsdfEval(s.base_color * pdf, pdf);
-}
-
-fn eval_with(s: Surface, lobes: Lobes, wo: vec3<f32>, wi: vec3<f32>) -> BsdfEval {
-    if dot3(s.ng, wi) > 0.0 {
-        return eval_reflection(s, lobes, wo, wi);
-    }
-    @if(transmission) {
-        if s.transmission > 0.0 && !transmits_delta(s) && dot3(s.ng, wi) < 0.0 {
-            return eval_transmission(s, lobes, wo, wi);
-        }
-    }
-    return EVAL_NOTHING;
-}
-
-fn eval_reflection(s: Surface, lobes: Lobes, wo: vec3<f32>, wi: vec3<f32>) -> BsdfEval {
-    var f_cos = vec3<f32>(0.0);
-    var pdf = 0.0;
-    let under = 1.0 - lobes.coat;
-    if lobes.p_diffuse > 0.0 {
-        let sum = wo + wi;
-        let cos_half = 0.5 * sqrt(dot3(sum, sum));
-        let cosine = lambert_cos(s, wi) * INV_PI;
-        let passed = 1.0 - max3(opaque_fresnel(s, cos_half));
-        f_cos += diffuse_color(s) * (under * passed * cosine);
-        pdf += lobes.p_diffuse * cosine;
-    }
-    if lobes.p_interface > 0.0 && !reflects_delta(s) {
-        let g = ggx_reflect(s.ggx_alpha, s.ns, wo, wi);
-        let facet = interface_at(s, g.cos_half);
-        let chosen = select(facet.reflect_probability, lobes.interface_.reflect_probability, transmits_delta(s));
-        f_cos += facet.reflected * (under * g.f_cos);
-        pdf += lobes.p_interface * chosen * g.pdf;
-    }
-    @if(clearcoat) {
-        if lobes.p_coat > 0.0 && !coat_delta(s) {
-            let g = ggx_reflect(s.coat_alpha, s.coat_ns, wo, wi);
-            f_cos += vec3<f32>(lobes.coat * g.f_cos);
-            pdf += lobes.p_coat * g.pdf;
-        }
-    }
-    return BsdfEval(f_cos, pdf);
-}
-
-fn eval_transmission(s: Surface, lobes: Lobes, wo: vec3<f32>, wi: vec3<f32>) -> BsdfEval {
-    var g: GgxEval;
-    if thin_walled(s) {
-        g = ggx_reflect(s.ggx_alpha, s.ns, wo, mirrored_at(s.ns, wi));
-    } else {
-        g = ggx_refract(s.ggx_alpha, s.ns, wo, wi, surface_index(s).eta);
-    }
-    let facet = interface_at(s, g.cos_half);
-    return BsdfEval(
-        facet.transmitted * ((1.0 - lobes.coat) * g.f_cos),
-        lobes.p_interface * facet.transmit_probability * g.pdf,
-    );
-}
-
-fn mirrored_at(normal: vec3<f32>, v: vec3<f32>) -> vec3<f32> {
-    return v - normal * (2.0 * dot3(v, normal));
-}
-
-fn reflected_about(h: vec3<f32>, wo: vec3<f32>) -> vec3<f32> {
-    return h * (2.0 * dot3(wo, h)) - wo;
-}
-
-fn on_side(ng: vec3<f32>, side: f32, w: vec3<f32>) -> vec3<f32> {
-    let height = side * dot3(ng, w);
-    if height > 0.0 {
-        return w;
-    }
-    return unit(w + ng * (side * (GRAZING_LIFT - height)));
-}
-
-fn delta_sample(wi: vec3<f32>, weight: vec3<f32>, transmitted: bool) -> BsdfSample {
-    return BsdfSample(wi, weight, 0.0, true, transmitted, true);
-}
-
-fn mixture_sample(s: Surface, lobes: Lobes, wo: vec3<f32>, wi: vec3<f32>) -> BsdfSample {
-    let eval = eval_with(s, lobes, wo, wi);
-    if eval.pdf <= 0.0 {
-        return SAMPLE_NOTHING;
-    }
-    return BsdfSample(wi, eval.f_cos * (1.0 / eval.pdf), eval.pdf, false, dot3(s.ng, wi) < 0.0, true);
-}
-
-fn sample_lambert(s: Surface, u0: f32, u1: f32) -> vec3<f32> {
-    let basis = orthonormal_basis(s.ns);
-    let phi = sincos_2pi(u0);
-    let radius = sqrt(u1);
-    let z = sqrt(max(1.0 - u1, 0.0));
-    let w = unit(basis.t * (radius * phi.cos) + basis.b * (radius * phi.sin) + s.ns * z);
-    if dot3(s.ng, w) < 0.0 {
-        return mirrored_at(s.ng, w);
-    }
-    return w;
 }
 
 fn bsdf_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
@@ -144,7 +30,7 @@ fn bsdf_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
     }
     @if(rough_specular) {
         if !bsdf_is_lambertian(s) {
-            return sample_layers(s, wo, u);
+            return lobes_sample(s, wo, u);
         }
     }
     let wi = sample_lambert(s, u.y, u.z);
@@ -155,95 +41,6 @@ fn bsdf_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
     return BsdfSample(wi, s.base_color, pdf, false, false, true);
 }
 
-fn sample_layers(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
-    let lobes = lobes_at(s, wo);
-    if lobes.sum <= NO_ALBEDO {
-        return SAMPLE_NOTHING;
-    }
-    if u.x < lobes.p_diffuse {
-        return mixture_sample(s, lobes, wo, sample_lambert(s, u.y, u.z));
-    }
-    let rest = u.x - lobes.p_diffuse;
-    @if(clearcoat) {
-        if !(rest < lobes.p_interface || lobes.p_coat == 0.0) {
-            return sample_coat(s, lobes, wo, u);
-        }
-    }
-    let choice = min(rest / max(lobes.p_interface, 1e-20), LARGEST_BELOW_1);
-    return sample_interface(s, lobes, wo, choice, u);
-}
-
-fn sample_coat(s: Surface, lobes: Lobes, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
-    if coat_delta(s) {
-        let wi = on_side(s.ng, 1.0, reflected_about(s.coat_ns, wo));
-        return delta_sample(wi, vec3<f32>(lobes.sum), false);
-    }
-    let h = ggx_sample_half(s.coat_alpha, s.coat_ns, wo, u.y, u.z);
-    let mirror = unit(reflected_about(h, wo));
-    if dot3(s.coat_ns, mirror) > 0.0 && dot3(s.ng, mirror) > 0.0 {
-        return mixture_sample(s, lobes, wo, mirror);
-    }
-    return SAMPLE_NOTHING;
-}
-
-fn sample_interface(s: Surface, lobes: Lobes, wo: vec3<f32>, choice: f32, u: vec3<f32>) -> BsdfSample {
-    let at_normal = lobes.interface_;
-    if reflects_delta(s) || transmits_delta(s) {
-        let reflects = choice < at_normal.reflect_probability;
-        @if(transmission) {
-            if !reflects {
-                let tint = at_normal.transmitted / max(max3(at_normal.transmitted), NO_ALBEDO);
-                let scale = at_normal.total / lobes.interface_albedo * lobes.sum;
-                return delta_sample(transmit_straight(s, wo), tint * scale, true);
-            }
-        }
-        if reflects_delta(s) {
-            let tint = at_normal.reflected / max(max3(at_normal.reflected), NO_ALBEDO);
-            let wi = on_side(s.ng, 1.0, reflected_about(s.ns, wo));
-            return delta_sample(wi, tint * lobes.sum, false);
-        }
-    }
-    let h = ggx_sample_half(s.ggx_alpha, s.ns, wo, u.y, u.z);
-    let cos_half = dot3(wo, h);
-    if cos_half <= 0.0 {
-        return SAMPLE_NOTHING;
-    }
-    let mirror = unit(reflected_about(h, wo));
-    var reflects = true;
-    @if(transmission) {
-        reflects = transmits_delta(s) || choice < interface_at(s, cos_half).reflect_probability;
-    }
-    if reflects {
-        if dot3(s.ns, mirror) > 0.0 && dot3(s.ng, mirror) > 0.0 {
-            return mixture_sample(s, lobes, wo, mirror);
-        }
-        return SAMPLE_NOTHING;
-    }
-    @if(transmission) {
-        var through: vec3<f32>;
-        if thin_walled(s) {
-            through = mirrored_at(s.ns, mirror);
-        } else {
-            let index = surface_index(s);
-            through = unit(refract_about(wo, h, cos_half, index, fresnel_dielectric(cos_half, index).g));
-        }
-        if dot3(s.ns, through) < 0.0 && dot3(s.ng, through) < 0.0 {
-            return mixture_sample(s, lobes, wo, through);
-        }
-    }
-    return SAMPLE_NOTHING;
-}
-
-fn transmit_straight(s: Surface, wo: vec3<f32>) -> vec3<f32> {
-    let index = surface_index(s);
-    if thin_walled(s) || index.eta2_minus_1 == 0.0 {
-        return -wo;
-    }
-    let cos = cos_to(s.ns, wo);
-    let wi = refract_about(wo, s.ns, cos, index, fresnel_dielectric(cos, index).g);
-    return on_side(s.ng, -1.0, unit(wi));
-}
-
 fn bsdf_is_delta(s: Surface) -> bool {
     if scatters_nothing(s) {
         return true;
@@ -251,7 +48,11 @@ fn bsdf_is_delta(s: Surface) -> bool {
     if bsdf_is_lambertian(s) {
         return false;
     }
-    return max3(diffuse_color(s)) == 0.0 && reflects_delta(s) && (s.clearcoat == 0.0 || coat_delta(s));
+    return lobes_are_delta(s);
+}
+
+fn bsdf_is_polished(s: Surface) -> bool {
+    return !scatters_nothing(s) && !bsdf_is_lambertian(s) && lobes_are_polished(s);
 }
 
 fn bsdf_passes_straight(s: Surface) -> bool {
@@ -268,10 +69,7 @@ fn bsdf_albedo(s: Surface, wo: vec3<f32>) -> vec3<f32> {
     }
     @if(rough_specular) {
         if !bsdf_is_lambertian(s) {
-            let lobes = lobes_at(s, wo);
-            let under = lobes.interface_.reflected + lobes.interface_.transmitted
-                + diffuse_albedo(s, cos_to(s.ns, wo));
-            return min(under * (1.0 - lobes.coat) + vec3<f32>(lobes.coat), vec3<f32>(1.0));
+            return lobes_albedo(s, wo);
         }
     }
     return s.base_color;
@@ -284,6 +82,5 @@ fn bsdf_directional_albedo_bound(s: Surface) -> f32 {
     if bsdf_is_lambertian(s) {
         return max3(s.base_color);
     }
-    let under = max3(diffuse_color(s)) + grazing_albedo(s);
-    return select(under, max(under, 1.0), s.clearcoat > 0.0);
+    return lobes_bound(s);
 }

@@ -12,11 +12,6 @@ fn normal_reflectance(ior: f32) -> f32 {
     return r * r;
 }
 
-struct RelativeIndex {
-    eta: f32,
-    eta2_minus_1: f32,
-}
-
 fn relative_index(ior: f32, entering: bool) -> RelativeIndex {
     let n = max(ior, 1e-3);
     let n2_minus_1 = (n - 1.0) * (n + 1.0);
@@ -24,12 +19,6 @@ fn relative_index(ior: f32, entering: bool) -> RelativeIndex {
         return RelativeIndex(n, n2_minus_1);
     }
     return RelativeIndex(1.0 / n, -n2_minus_1 / (n * n));
-}
-
-struct DielectricFresnel {
-    reflectance: f32,
-    g: f32,
-    total: bool,
 }
 
 fn fresnel_dielectric(cos: f32, index: RelativeIndex) -> DielectricFresnel {

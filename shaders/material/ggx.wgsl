@@ -3,7 +3,6 @@
 import package::math::{INV_PI, dot3, orthonormal_basis, sincos_2pi};
 import package::material::normal::unit;
 
-
 fn smith_l(alpha: f32, c: f32) -> f32 {
     let a2 = alpha * alpha;
     return c + sqrt(a2 + (1.0 - a2) * c * c);
@@ -15,12 +14,6 @@ fn ggx_d(alpha: f32, normal: vec3<f32>, sum: vec3<f32>) -> f32 {
     let a2 = alpha * alpha;
     let t = (dot3(across, across) / a2 + z * z) / dot3(sum, sum);
     return INV_PI / (a2 * t * t);
-}
-
-struct GgxEval {
-    f_cos: f32,
-    pdf: f32,
-    cos_half: f32,
 }
 
 const NOTHING = GgxEval(0.0, 0.0, 1.0);

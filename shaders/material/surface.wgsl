@@ -1,8 +1,9 @@
 // Twin of src/material/surface.rs: the same operations in the same order.
 
 import package::gpu::buffers::{frame, materials, photo_albedo, texture_refs, triangles, vertices};
+import package::packed::materials::Material;
 import package::packed::records::{
-    Material, Vertex, TEXTURE_UV1, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
+    Vertex, TEXTURE_UV1, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
     MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
 };
 import package::shared::NONE;
@@ -11,31 +12,6 @@ import package::math::{cross3, dot3, safe_sqrt};
 import package::material::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
 import package::material::texture::{slot, slot_rgb, texture_sample};
 import package::accel::trace::Hit;
-
-
-struct Surface {
-    position: vec3<f32>,
-    error: f32,
-    ng: vec3<f32>,
-    ns: vec3<f32>,
-    coat_ns: vec3<f32>,
-    base_color: vec3<f32>,
-    metallic: f32,
-    ggx_alpha: f32,
-    ior: f32,
-    specular: f32,
-    specular_color: vec3<f32>,
-    transmission: f32,
-    clearcoat: f32,
-    coat_alpha: f32,
-    emission: vec3<f32>,
-    coverage: f32,
-    front: bool,
-    flags: u32,
-    material: u32,
-    light: u32,
-    object: u32,
-}
 
 fn blend2(b: vec3<f32>, v0: vec2<f32>, v1: vec2<f32>, v2: vec2<f32>) -> vec2<f32> {
     return v0 * b.x + v1 * b.y + v2 * b.z;

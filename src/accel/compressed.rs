@@ -4,6 +4,8 @@
 //! what then does not fit; with an outlier a million times larger than the rest its boxes lose triangles. Here cells are found in f64 and
 //! widened by its rounding, so that a decompressed box contains its triangles exactly. What the shader's own arithmetic adds is bounded there.
 
+use std::sync::LazyLock;
+
 use glam::{DVec3, Vec3};
 use obvhs::{
     aabb::Aabb,
@@ -19,9 +21,62 @@ const MAX_LEAF_TRIANGLES: u32 = 3;
 /// Smallest biased exponent of a cell, 2^-100: keeps cell sizes and their products with inverse directions normal numbers.
 const LEAST_EXPONENT: i32 = 27;
 
+/// As the shader reads it.
+pub type Node = [[u32; 4]; 5];
+
 pub(super) struct CompressedBvh {
-    nodes: Vec<[[u32; 4]; 5]>,
-    leaves: Vec<[f32; 4]>,
+    /// The root first.
+    pub(super) nodes: Vec<Node>,
+    /// Three a triangle.
+    pub(super) leaves: Vec<[f32; 4]>,
+    /// Around all triangles, enlarged; `None` without any.
+    bounds: Option<Aabb>,
+}
+
+/// Where in a world's arrays the nodes below a tree's root and its triangles stand.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    node: u32,
+    triangle: u32,
+}
+
+/// A root over two trees, and theirs.
+const ROOTS: u32 = 3;
+
+impl Place {
+    /// Of the first of two trees, after the roots.
+    pub(super) const FIRST: Place = Place {
+        node: ROOTS,
+        triangle: 0,
+    };
+
+    /// Of the second, after the first.
+    pub(super) fn after(first: &CompressedBvh) -> Place {
+        Place {
+            node: ROOTS + first.nodes.len() as u32 - 1,
+            triangle: first.leaves.len() as u32 / 3,
+        }
+    }
+}
+
+/// A root over two trees at their places, and their roots. Where one has no triangles the other's root is the root, and the rest unused.
+pub(super) fn join(first: &CompressedBvh, second: &CompressedBvh) -> [Node; ROOTS as usize] {
+    let (a, b) = match (first.bounds, second.bounds) {
+        (Some(a), Some(b)) => (a, b),
+        (None, Some(_)) => return [second.nodes[0]; ROOTS as usize],
+        (_, None) => return [first.nodes[0]; ROOTS as usize],
+    };
+    let mut root = CwBvhNode {
+        child_base_idx: 1,
+        imask: 0b11,
+        ..Default::default()
+    };
+    // As obvhs marks a node: 24 and its slot.
+    root.child_meta[..2].copy_from_slice(&[1 << 5 | 24, 1 << 5 | 25]);
+    let mut boxes = [None; 8];
+    boxes[..2].copy_from_slice(&[Some(a), Some(b)]);
+    compress(&mut root, &boxes);
+    [bytemuck::cast(root), first.nodes[0], second.nodes[0]]
 }
 
 impl CompressedBvh {
@@ -30,7 +85,14 @@ impl CompressedBvh {
         CompressedBvh {
             nodes: vec![[[0; 4]; 5]],
             leaves: Vec::new(),
+            bounds: None,
         }
+    }
+
+    /// [`CompressedBvh::empty`], for those who have none of their own.
+    pub(super) fn none() -> &'static CompressedBvh {
+        static NONE: LazyLock<CompressedBvh> = LazyLock::new(CompressedBvh::empty);
+        &NONE
     }
 
     /// `None` if the tree is too deep for the shader's stack. The BVH2's depth must be bounded: obvhs recurses.
@@ -38,10 +100,12 @@ impl CompressedBvh {
         tree: &Bvh2,
         triangles: &[[Vec3; 3]],
         first_id: u32,
+        place: Place,
     ) -> Option<CompressedBvh> {
         let mut converted = bvh2_to_cwbvh(tree, MAX_LEAF_TRIANGLES, true, false);
         let nodes = &mut converted.nodes;
-        if levels(nodes) > MAX_LEVELS {
+        // One more joins two trees.
+        if levels(nodes) >= MAX_LEVELS {
             return None;
         }
         // Box of each triangle in leaf order, enlarged as in the BVH2.
@@ -76,18 +140,15 @@ impl CompressedBvh {
             leaves.push([b.x, b.y, b.z, 0.0]);
             leaves.push([c.x, c.y, c.z, 0.0]);
         }
+        for node in nodes.iter_mut() {
+            node.child_base_idx += place.node - 1;
+            node.primitive_base_idx += place.triangle;
+        }
         Some(CompressedBvh {
             nodes: bytemuck::cast_slice(nodes).to_vec(),
             leaves,
+            bounds: node_boxes.first().copied(),
         })
-    }
-
-    pub(super) fn nodes(&self) -> &[[[u32; 4]; 5]] {
-        &self.nodes
-    }
-
-    pub(super) fn leaves(&self) -> &[[f32; 4]] {
-        &self.leaves
     }
 }
 

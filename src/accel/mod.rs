@@ -1,6 +1,6 @@
 //! Acceleration structures: one over the real, one over the virtual triangles.
 //!
-//! obvhs builds one BVH2 a world (`binary`). From it come an 8-wide tree of f32 boxes for the CPU (`wide`, traversed by `trace`) and a
+//! obvhs builds one BVH2 a world (`binary`), and a second over what moves in it (`tree`). From each come an 8-wide tree of f32 boxes for the CPU (`wide`, traversed by `trace`) and a
 //! compressed wide tree for the GPU (`compressed`, traversed by `shaders/accel/trace.wgsl`). Both test triangles with the watertight test of
 //! Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013, in the same f32 operations, and decide equal distances by
 //! the smaller triangle id, so that they report the same hits.
@@ -22,35 +22,29 @@ mod large_pages;
 mod spheres;
 mod stack;
 pub(crate) mod trace;
+mod tree;
 mod wide;
 
 #[cfg(all(test, feature = "bench"))]
-mod gpu_tests;
-#[cfg(all(test, feature = "bench"))]
 mod tests;
 
-use std::sync::{Mutex, OnceLock};
+use std::sync::OnceLock;
 
 use glam::Vec3;
-use obvhs::bvh2::Bvh2;
 use thiserror::Error;
 
 use crate::shared::NONE;
-use compressed::CompressedBvh;
+use compressed::{CompressedBvh, Place};
 use kernel::Kernel;
+pub use spheres::Cover;
 pub use trace::Hit;
-use wide::WideBvh;
+use tree::Tree;
 
 /// Largest absolute coordinate, metres, for which no product in the triangle test overflows.
 pub const MAX_COORDINATE_M: f32 = 1.0e13;
 
 /// Most triangles in one world: child words keep 28 bits for a block of eight.
 pub const MAX_TRIANGLES: usize = 1 << 27;
-
-/// At most `max` spheres (centre, radius) over triangles, as [`WorldBvh::bounding_spheres`].
-pub fn covering_spheres(triangles: &[[Vec3; 3]], max: usize) -> Vec<[f32; 4]> {
-    spheres::cover(triangles, max)
-}
 
 /// A half-line with the interval in which hits count.
 ///
@@ -93,16 +87,14 @@ pub enum AccelError {
     Coordinate { triangle: usize },
 }
 
-/// The triangles of one world, ready for rays on the CPU and, once a GPU asks, for upload.
+/// The triangles of one world, ready for rays on the CPU and, once a GPU asks, for upload: a tree of what rests, and where anything moves,
+/// another of that, which alone is built anew for each instant.
 pub struct WorldBvh {
-    wide: WideBvh,
-    /// What the GPU's tree is made from, until it is.
-    tree: Mutex<Option<Bvh2>>,
-    triangles: Vec<[Vec3; 3]>,
-    first_id: u32,
-    compressed: OnceLock<CompressedBvh>,
+    resting: Tree,
+    moving: Option<Tree>,
+    /// The GPU's root over both trees, and theirs.
+    roots: OnceLock<[compressed::Node; 3]>,
     kernel: Kernel,
-    bounds: Option<(Vec3, Vec3)>,
 }
 
 impl WorldBvh {
@@ -112,62 +104,23 @@ impl WorldBvh {
     /// # Errors
     /// More than [`MAX_TRIANGLES`], or a coordinate that is not finite or larger than [`MAX_COORDINATE_M`].
     pub fn build(triangles: &[[Vec3; 3]], first_id: u32) -> Result<WorldBvh, AccelError> {
-        if triangles.len() > MAX_TRIANGLES || triangles.len() > (NONE - first_id) as usize {
-            return Err(AccelError::TooManyTriangles {
-                count: triangles.len(),
-            });
-        }
-        let mut low = Vec3::splat(f32::INFINITY);
-        let mut high = Vec3::splat(f32::NEG_INFINITY);
-        for (index, triangle) in triangles.iter().enumerate() {
-            for vertex in triangle {
-                if !vertex.is_finite() || vertex.abs().max_element() > MAX_COORDINATE_M {
-                    return Err(AccelError::Coordinate { triangle: index });
-                }
-                low = low.min(*vertex);
-                high = high.max(*vertex);
-            }
-        }
-        let mut tree = binary::build(triangles);
-        let mut wide = WideBvh::empty();
-        if let Some(built) = &mut tree {
-            wide = Self::collapse(built, triangles, first_id).unwrap_or_else(|| {
-                // A tree too deep for the traversal stacks; the balanced one never is.
-                *built = binary::build_balanced(triangles);
-                Self::collapse(built, triangles, first_id).expect("a balanced tree fits the stacks")
-            });
-        }
         Ok(WorldBvh {
-            wide,
-            tree: Mutex::new(tree),
-            triangles: triangles.to_vec(),
-            first_id,
-            compressed: OnceLock::new(),
+            resting: Tree::build(triangles, first_id)?,
+            moving: None,
+            roots: OnceLock::new(),
             kernel: Kernel::best(),
-            bounds: (!triangles.is_empty()).then_some((low, high)),
         })
     }
 
-    fn collapse(tree: &Bvh2, triangles: &[[Vec3; 3]], first_id: u32) -> Option<WideBvh> {
-        if binary::depth(tree) > binary::MAX_DEPTH {
-            return None;
-        }
-        WideBvh::collapse(tree, triangles, first_id)
-    }
-
-    /// The GPU's tree, made when it is first asked for: a render on the CPU does without.
-    fn compressed(&self) -> &CompressedBvh {
-        self.compressed.get_or_init(|| {
-            let convert =
-                |tree: &Bvh2| CompressedBvh::convert(tree, &self.triangles, self.first_id);
-            match self.tree.lock().unwrap_or_else(|e| e.into_inner()).take() {
-                Some(tree) => convert(&tree).unwrap_or_else(|| {
-                    convert(&binary::build_balanced(&self.triangles))
-                        .expect("a balanced tree fits the stack")
-                }),
-                None => CompressedBvh::empty(),
-            }
-        })
+    /// Replaces the triangles that move, whose ids follow those that rest; what rests is not touched.
+    ///
+    /// # Errors
+    /// As [`WorldBvh::build`].
+    pub fn set_moving(&mut self, triangles: &[[Vec3; 3]]) -> Result<(), AccelError> {
+        let build = || Tree::build(triangles, self.resting.end_id());
+        self.moving = (!triangles.is_empty()).then(build).transpose()?;
+        self.roots = OnceLock::new();
+        Ok(())
     }
 
     /// The nearest hit; of several at the same distance the smallest triangle id. A ray with a coordinate that is not finite misses.
@@ -184,32 +137,49 @@ impl WorldBvh {
 
     #[inline]
     fn closest_by(&self, kernel: Kernel, ray: &Ray) -> Hit {
-        kernel::closest(&self.wide, kernel, ray)
+        let hit = kernel::closest(&self.resting.wide, kernel, ray);
+        let Some(moving) = &self.moving else {
+            return hit;
+        };
+        // At equal distance the hit stands: what moves has the larger ids.
+        let t_max = ray.t_max.min(hit.t);
+        let nearer = kernel::closest(&moving.wide, kernel, &Ray { t_max, ..*ray });
+        if nearer.is_hit() { nearer } else { hit }
     }
 
     #[inline]
     fn any_by(&self, kernel: Kernel, ray: &Ray) -> bool {
-        kernel::any(&self.wide, kernel, ray)
+        kernel::any(&self.resting.wide, kernel, ray)
+            || (self.moving.as_ref()).is_some_and(|moving| kernel::any(&moving.wide, kernel, ray))
     }
 
     /// Smallest and largest vertex coordinates; `None` without triangles.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        self.bounds
+        let moving = self.moving.as_ref().and_then(|tree| tree.bounds);
+        let all = self.resting.bounds.into_iter().chain(moving);
+        all.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
-    /// Nodes of the GPU's tree, five vec4<u32> each, at least one. Child and triangle indices inside are relative to this world.
-    pub fn gpu_nodes(&self) -> &[[[u32; 4]; 5]] {
-        self.compressed().nodes()
+    /// Nodes of the GPU's tree, five vec4<u32> each: roots, below what rests, below what moves. Child and triangle indices inside are relative
+    /// to this world.
+    pub fn gpu_nodes(&self) -> [&[compressed::Node]; 3] {
+        let [resting, moving] = self.compressed();
+        let roots = self.roots.get_or_init(|| compressed::join(resting, moving));
+        [roots, &resting.nodes[1..], &moving.nodes[1..]]
     }
 
-    /// Triangles in the order of the GPU's leaves, three vec4<f32> each: the vertices, w of the first holding the bits of the global id.
-    pub fn gpu_leaves(&self) -> &[[f32; 4]] {
-        self.compressed().leaves()
+    /// Triangles in the order of the GPU's leaves, what rests and what moves, three vec4<f32> each: the vertices, w of the first holding the
+    /// bits of the global id.
+    pub fn gpu_leaves(&self) -> [&[[f32; 4]]; 2] {
+        self.compressed().map(|tree| &*tree.leaves)
     }
 
-    /// At most `max` spheres (centre, radius) that together contain every triangle; fewer where more would hardly be smaller in total
-    /// cross-section. Empty without triangles or with `max == 0`.
-    pub fn bounding_spheres(&self, max: usize) -> Vec<[f32; 4]> {
-        spheres::cover(&self.triangles, max)
+    fn compressed(&self) -> [&CompressedBvh; 2] {
+        let resting = self.resting.compressed(Place::FIRST);
+        let moving = match &self.moving {
+            Some(moving) => moving.compressed(Place::after(resting)),
+            None => CompressedBvh::none(),
+        };
+        [resting, moving]
     }
 }

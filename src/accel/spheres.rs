@@ -17,37 +17,85 @@ struct Cluster {
     split: Option<Box<(Cluster, Cluster)>>,
 }
 
-/// At most `max` spheres (centre, radius) over the mesh's triangles.
-///
-/// Splits the cluster whose split saves most of the sum of squared radii, which is what the cones towards the spheres cover, until none
-/// saves enough.
-pub(super) fn cover(mesh: &[[Vec3; 3]], max: usize) -> Vec<[f32; 4]> {
-    if mesh.is_empty() || max == 0 {
-        return Vec::new();
-    }
-    let all = (0..mesh.len() as u32).collect();
-    let mut clusters = vec![Cluster::new(mesh, all)];
-    if max > 1 {
-        clusters[0].find_split(mesh);
-    }
-    while clusters.len() < max {
-        let best = clusters
-            .iter()
-            .enumerate()
-            .max_by(|(_, a), (_, b)| a.gain().total_cmp(&b.gain()));
-        let Some((index, cluster)) = best else { break };
-        if cluster.split.is_none() {
-            break;
-        }
-        let Some(parts) = clusters.swap_remove(index).split else {
-            break;
+/// Spheres (centre, radius) that together contain all triangles of a mesh: one, and how it is replaced by more.
+pub struct Cover {
+    /// `None` without triangles.
+    whole: Option<[f32; 4]>,
+    splits: Vec<Split>,
+}
+
+/// Two spheres in place of one.
+struct Split {
+    /// Of the list as the splits before have left it.
+    replaced: usize,
+    parts: [[f32; 4]; 2],
+    /// Off the sum of squared radii.
+    gain: f64,
+}
+
+impl Cover {
+    /// Splits the cluster whose split saves most of the sum of squared radii, which is what the cones towards the spheres cover, until none
+    /// saves enough, or there are `max` spheres.
+    pub fn of(mesh: &[[Vec3; 3]], max: usize) -> Cover {
+        let mut cover = Cover {
+            whole: None,
+            splits: Vec::new(),
         };
-        let (mut a, mut b) = *parts;
-        a.find_split(mesh);
-        b.find_split(mesh);
-        clusters.extend([a, b]);
+        if mesh.is_empty() {
+            return cover;
+        }
+        let all = (0..mesh.len() as u32).collect();
+        let mut clusters = vec![Cluster::new(mesh, all)];
+        cover.whole = Some(clusters[0].rounded());
+        if max > 1 {
+            clusters[0].find_split(mesh);
+        }
+        while clusters.len() < max {
+            let best = clusters
+                .iter()
+                .enumerate()
+                .max_by(|(_, a), (_, b)| a.gain().total_cmp(&b.gain()));
+            let Some((replaced, cluster)) = best else {
+                break;
+            };
+            let gain = cluster.gain();
+            let Some(parts) = clusters.swap_remove(replaced).split else {
+                break;
+            };
+            let (mut a, mut b) = *parts;
+            cover.splits.push(Split {
+                replaced,
+                parts: [a.rounded(), b.rounded()],
+                gain,
+            });
+            a.find_split(mesh);
+            b.find_split(mesh);
+            clusters.extend([a, b]);
+        }
+        cover
     }
-    clusters.iter().map(Cluster::rounded).collect()
+
+    /// At most `max` spheres over all meshes, or one a mesh; fewer where more would hardly be smaller in total cross-section. Of two meshes
+    /// the one is split whose next split saves more.
+    pub fn spheres(covers: &[&Cover], max: usize) -> Vec<[f32; 4]> {
+        let mut lists: Vec<Vec<[f32; 4]>> = (covers.iter())
+            .map(|cover| Vec::from_iter(cover.whole))
+            .collect();
+        let mut left: Vec<&[Split]> = covers.iter().map(|cover| &*cover.splits).collect();
+        let count = |lists: &[Vec<_>]| lists.iter().map(Vec::len).sum::<usize>();
+        while count(&lists) < max {
+            let next = (left.iter().enumerate())
+                .filter_map(|(mesh, splits)| Some((mesh, splits.split_first()?)))
+                .max_by(|(_, (a, _)), (_, (b, _))| a.gain.total_cmp(&b.gain));
+            let Some((mesh, (split, rest))) = next else {
+                break;
+            };
+            lists[mesh].swap_remove(split.replaced);
+            lists[mesh].extend(split.parts);
+            left[mesh] = rest;
+        }
+        lists.concat()
+    }
 }
 
 fn corners(mesh: &[[Vec3; 3]], triangle: u32) -> impl Iterator<Item = DVec3> + '_ {

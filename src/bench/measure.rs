@@ -333,7 +333,7 @@ impl Subject {
 
 fn mean_rays(samples: &[Sample]) -> RayCounts {
     let sum: RayCounts = samples.iter().map(|sample| sample.rays).sum();
-    sum.map(|total| total / samples.len().max(1) as u64)
+    sum / samples.len().max(1) as u64
 }
 
 fn mean(values: &[f64]) -> f64 {

@@ -1,10 +1,13 @@
 //! The record of a benchmark: what `results.json` holds and every table, plot and comparison is made from.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::{Errors, Goal, Machine, Reach};
+use crate::Refusal;
+use crate::decode::{MAX_TEXT_BYTES, read_text};
 use crate::renderer::{RayCounts, Skip};
 use crate::scene::{BackendChoice, Composite, Estimator, SamplerKind};
 
@@ -24,6 +27,27 @@ pub struct Report {
     /// Least-squares slope of log RMSE over log rays per pixel, by scene and method.
     pub slopes: BTreeMap<String, f64>,
     pub targets: Vec<Target>,
+}
+
+impl Report {
+    /// Reads a `results.json`.
+    ///
+    /// # Errors
+    /// The file, and why it is none.
+    pub fn read(path: &Path) -> Result<Self, Refusal> {
+        let problem = |reason: String| Refusal::from(format!("{}: {reason}", path.display()));
+        let text = read_text(path, MAX_TEXT_BYTES).map_err(problem)?;
+        let value: serde_json::Value = serde_json::from_str(&text)
+            .map_err(|error| problem(format!("is no results.json: {error}")))?;
+        let format = value.get("format").and_then(serde_json::Value::as_u64);
+        if format != Some(u64::from(FORMAT)) {
+            return Err(problem(format!(
+                "is no results.json of format {FORMAT}; make it again with this version"
+            )));
+        }
+        serde_json::from_value(value)
+            .map_err(|error| problem(format!("is no results.json: {error}")))
+    }
 }
 
 /// What the errors of a scene are measured against.

@@ -9,24 +9,27 @@ use super::shutter::{CameraPose, camera_pose};
 use crate::distortion::{Coefficients, distort, distortion_area, undistort_fast};
 use crate::math::{INV_TAU, dot3, normalize3, sincos_2pi};
 use crate::packed::{APERTURE_DISC, APERTURE_SQUARE, Frame};
+use crate::shared::shared;
 
-/// Anchor-relative origin in metres, unit direction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CameraRay {
-    pub origin: Vec3,
-    pub direction: Vec3,
-}
+shared! {
+    /// Anchor-relative origin in metres, unit direction.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub value struct CameraRay {
+        pub origin: Vec3,
+        pub direction: Vec3,
+    }
 
-/// Where the pinhole camera sees a point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Projection {
-    /// Photograph pixels, corner origin.
-    pub px: f32,
-    pub py: f32,
-    /// Metres along the view axis.
-    pub depth: f32,
-    /// In front of the camera, inside the photograph, and on the lens model's usable side of its fold.
-    pub valid: bool,
+    /// Where the pinhole camera sees a point.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub value struct Projection {
+        /// Photograph pixels, corner origin.
+        pub px: f32,
+        pub py: f32,
+        /// Metres along the view axis.
+        pub depth: f32,
+        /// In front of the camera, inside the photograph, and on the lens model's usable side of its fold.
+        pub valid: bool,
+    }
 }
 
 /// A point of the aperture, metres to the camera's right and up, uniform in area over (u, v) in [0, 1)^2 and continuous where the

@@ -36,20 +36,28 @@ shared! {
         0x0001f104, 0x0002e28a, 0x000457df, 0x000c9bae, 0x0011a105, 0x002a7289, 0x0079e7db, 0x00b6dba4,
         0x0100011a, 0x030002a7, 0x0400079e, 0x0a000b6d, 0x1f001001, 0x2e003003, 0x45004004, 0xc900a00a,
     ];
-}
 
-/// What a sample's values depend on, besides the set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct SampleKey {
-    /// Row-major pixel index.
-    pub pixel: u32,
-    /// Sample of the pixel, 0..total.
-    pub index: u32,
-    /// Rays per pixel that `jittered` and `cmj` are laid out for, 1..=[`MAX_TOTAL`].
-    pub total: u32,
-    pub seed: u32,
-    /// `SAMPLER_*`; anything else is `sobol`.
-    pub sampler: u32,
+    /// What a sample's values depend on, besides the set.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+    pub value struct SampleKey {
+        /// Row-major pixel index.
+        pub pixel: u32,
+        /// Sample of the pixel, 0..total.
+        pub index: u32,
+        /// Rays per pixel that `jittered` and `cmj` are laid out for, 1..=[`MAX_TOTAL`].
+        pub total: u32,
+        pub seed: u32,
+        /// `SAMPLER_*`; anything else is `sobol`.
+        pub sampler: u32,
+    }
+
+    /// Cells that share the unit square among a pixel's samples.
+    value struct Grid {
+        columns: u32,
+        rows: u32,
+        /// Each row and column of cells is stratified too.
+        correlated: bool,
+    }
 }
 
 /// The four numbers of one set, each in [0, 1) and uniformly distributed over seeds, computed when they are asked for.
@@ -176,14 +184,6 @@ pub fn strata_columns(total: u32) -> u32 {
         n -= 1;
     }
     n
-}
-
-/// Cells that share the unit square among a pixel's samples.
-struct Grid {
-    columns: u32,
-    rows: u32,
-    /// Each row and column of cells is stratified too.
-    correlated: bool,
 }
 
 impl Grid {

@@ -12,15 +12,15 @@ use crate::shared::shared;
 shared! {
     /// Pixel and lens are set 0; the vertices' sets begin at 7.
     const SHUTTER_SET: u32 = 1;
-}
 
-/// Anchor-relative position in metres, and unit axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CameraPose {
-    pub position: Vec3,
-    pub right: Vec3,
-    pub up: Vec3,
-    pub back: Vec3,
+    /// Anchor-relative position in metres, and unit axes.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub value struct CameraPose {
+        pub position: Vec3,
+        pub right: Vec3,
+        pub up: Vec3,
+        pub back: Vec3,
+    }
 }
 
 /// The pose at the picture's time.

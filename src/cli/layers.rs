@@ -113,7 +113,7 @@ impl LayerArguments {
 
     /// Of an OpenEXR file, which may hold much else.
     fn read_channel(&self) -> Result<Plane, Failure> {
-        let mut file = ChannelFile::read(&self.mask).map_err(Failure)?;
+        let mut file = ChannelFile::read(&self.mask)?;
         let wanted: &[&str] = match self.depth {
             true => &["depth.Z", "Depth.Z", "Z", "Y", "R"],
             false => &["mask.Y", "A", "Y", "R"],

@@ -12,6 +12,7 @@ use super::{Failure, Outcome, print, say};
 use crate::film::Film;
 use crate::output::{FilmNote, PngBits, Target, read_film};
 use crate::renderer::{Progress, Renderer, Watcher};
+use crate::scene::sandbox::Sandbox;
 use crate::scene::{BackendChoice, Scene};
 
 /// Puts films of sample ranges together
@@ -53,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         .collect::<Result<Vec<_>, _>>()?;
     let mut parts = Vec::new();
     for path in &arguments.parts {
-        let (film, note) = read_film(path).map_err(Failure)?;
+        let (film, note) = read_film(path)?;
         parts.push(Part { path, film, note });
     }
     parts.sort_by_key(|part| part.note.range);
@@ -133,9 +134,18 @@ fn check(parts: &[Part]) -> Result<(), Failure> {
 
 /// The scene as it was rendered.
 fn load(part: &Part, given: Option<&Path>, flags: SceneFlags) -> Result<Scene, Failure> {
-    let hint = part.note.scene.as_deref().filter(|path| path.is_file());
+    let outside = |path: &Path| flags.sandbox && Sandbox::around(part.path).refusal(path).is_some();
+    let hint = part
+        .note
+        .scene
+        .as_deref()
+        .filter(|path| !outside(path) && path.is_file());
     let Some(path) = given.or(hint) else {
         let place = match &part.note.scene {
+            Some(path) if outside(path) => format!(
+                "is at {}, outside the film's folder, where --sandbox follows nothing",
+                path.display()
+            ),
             Some(path) => format!("is no longer at {}", path.display()),
             None => "has no place in common with the film".to_owned(),
         };

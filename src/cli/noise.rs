@@ -230,7 +230,7 @@ fn run_apply(arguments: &Apply) -> Result<Outcome, Failure> {
         eight_bit: arguments.paper,
         ..NoiseSettings::new(profile)
     };
-    settings.check_textures().map_err(Failure)?;
+    settings.check_textures()?;
     let mut layers = arguments.layers.read()?;
     let gpu = arguments.device.open()?;
     let start = Instant::now();

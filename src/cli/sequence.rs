@@ -12,6 +12,7 @@ use super::values::whole_range;
 use super::{Failure, Outcome, interrupt, print, say};
 use crate::output::{check_writable, write_text};
 use crate::renderer::Watcher;
+use crate::scene::trajectory::FORMATS;
 use crate::sequence::{Event, RenderedSequence, SequenceOptions, check_poses, render_sequence};
 
 /// Renders a scene's virtual objects into the frames of a video
@@ -24,8 +25,7 @@ pub(super) struct Arguments {
     /// Folder of pictures, .y4m file, file of JPEG pictures one after the other, or - for Y4M on standard input
     #[arg(long, value_name = "PATH")]
     frames: Option<PathBuf>,
-    /// Poses: .toml or .json of this program, transforms.json of nerfstudio, COLMAP's text model (folder or images.txt), or a TUM trajectory
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help = format!("Poses: {FORMATS}"))]
     trajectory: PathBuf,
     /// OpenCV calibration (YAML) in place of the intrinsics of trajectory and scene
     #[arg(long, value_name = "FILE")]

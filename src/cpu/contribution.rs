@@ -4,7 +4,8 @@ use glam::Vec3;
 
 use super::state::*;
 use crate::camera::sampler::{SampleKey, SampleSet, sample_set};
-use crate::packed::{ESTIMATOR_PAPER, FRAME_NO_PHOTONS, Frame, PackedScene};
+use crate::material::{Surface, bsdf_is_polished};
+use crate::packed::{ESTIMATOR_PAPER, FRAME_NO_PHOTONS, Frame, PackedScene, SIDE_VIRTUAL};
 use crate::shared::shared;
 
 shared! {
@@ -56,14 +57,14 @@ pub fn accumulate(scene: &PackedScene, st: &mut PathState, light: Vec3) {
     }
 }
 
-/// `events` after one more vertex of `depth` in a world (`side`): `delta` if a mirror or a smooth interface scattered there. That it scattered
+/// `events` after one more vertex of `depth` in a world (`side`): `smooth` if a mirror or a smooth interface scattered there, or it is polished. That it scattered
 /// otherwise is noted once the ray is followed.
-pub fn events_after(events: u32, depth: u32, side: u32, delta: bool) -> u32 {
-    if !delta {
+pub fn events_after(events: u32, depth: u32, side: u32, smooth: bool) -> u32 {
+    if !smooth {
         let seen = if depth == 1 { EVENT_SEEN } else { 0 };
         return (events & (EVENT_SEEN | EVENT_SCATTERED)) | seen;
     }
-    let chain = if side == 1 {
+    let chain = if side == SIDE_VIRTUAL {
         EVENT_VIRTUAL_CHAIN
     } else {
         EVENT_REAL_CHAIN
@@ -72,7 +73,7 @@ pub fn events_after(events: u32, depth: u32, side: u32, delta: bool) -> u32 {
     let before = if depth == 1 {
         events & EVENT_SCATTERED
     } else {
-        events
+        events & !EVENT_AT_POLISHED
     };
     before | chain
 }
@@ -83,6 +84,15 @@ pub fn left_to_photons(scene: &PackedScene, st: &PathState) -> bool {
     photons_traced(&scene.frame)
         && st.path.mode == MODE_MIXED
         && st.path.events & chain == EVENT_SEEN | EVENT_VIRTUAL_CHAIN
+}
+
+/// Whether photons bring what lights send by way of the vertex of a mixed path: it is virtual and polished, and comes after one that scatters.
+pub fn vertex_left_to_photons(scene: &PackedScene, st: &PathState, s: &Surface) -> bool {
+    photons_traced(&scene.frame)
+        && st.path.mode == MODE_MIXED
+        && st.ray.side == SIDE_VIRTUAL
+        && st.path.events & (EVENT_SEEN | EVENT_REAL_CHAIN) == EVENT_SEEN
+        && bsdf_is_polished(s)
 }
 
 pub fn photons_traced(frame: &Frame) -> bool {

@@ -48,19 +48,14 @@ fn turn_offset(scene: &PackedScene, pixel: u32, period: u32) -> u32 {
     hash_u32(hash_combine(scene.frame.seed ^ TURN_SALT, pixel)) % period
 }
 
-/// How many samples of the pixel, from `index` on and before `end`, are known to add nothing before their ray is even made.
-pub fn samples_without_turn(scene: &PackedScene, pixel: u32, index: u32, end: u32) -> u32 {
+/// Whether the sample is known to add nothing before its ray is even made.
+pub fn is_without_turn(scene: &PackedScene, pixel: u32, index: u32) -> bool {
     let info = &scene.pixels[pixel as usize];
-    if info.difference_period <= 1
-        || info.flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0
-        || scene.frame.estimator == ESTIMATOR_PAPER
-        || scene.frame.flags & FRAME_AOVS != 0
-    {
-        return 0;
-    }
-    let period = info.difference_period;
-    let in_period = (index + turn_offset(scene, pixel, period)) % period;
-    (period - 1 - in_period).min(end - index)
+    info.difference_period > 1
+        && info.flags & PIXEL_BEAM_MAY_MEET_VIRTUAL == 0
+        && scene.frame.estimator != ESTIMATOR_PAPER
+        && scene.frame.flags & FRAME_AOVS == 0
+        && difference_turn(scene, pixel, index) == NONE
 }
 
 /// Sets up the primary ray. `real_pass` renders the real radiance and the mask alone, for pixels that need Ir.
@@ -226,7 +221,8 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.path.pending &= !PENDING_NEXT;
             follow(st, st.next);
             if st.path.mode == MODE_DIFFERENCE {
-                st.path.events = events_after(st.path.events, st.ray.depth, st.ray.side, false);
+                let smooth = st.path.events & EVENT_AT_POLISHED != 0;
+                st.path.events = events_after(st.path.events, st.ray.depth, st.ray.side, smooth);
                 st.path.stage = STAGE_DIFFERENCE_CONE;
                 st.ray.request = REQUEST_VIRTUAL_THEN_REAL;
             } else {

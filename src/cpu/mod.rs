@@ -1,5 +1,6 @@
 //! The CPU backend: the estimator on all cores. It is the reference the shaders are compared with, and the fallback where there is no GPU.
 
+mod batch;
 pub mod contribution;
 pub mod estimator;
 pub mod photons;
@@ -8,7 +9,8 @@ pub mod render;
 pub mod request;
 pub mod state;
 mod surfaces;
+mod tiles;
 pub mod vertex;
 
-pub use pilot::pilot;
+pub use pilot::{pilot, pilot_steps};
 pub use surfaces::diffuse_surfaces;

@@ -3,15 +3,12 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::estimator::{advance, begin_sample, samples_without_turn};
-use super::request::answer;
-use super::state::{PathState, STAGE_DONE};
-use crate::film::{Film, GuideSums, PixelSums, Sample, guide_add, pixel_add_real};
+use super::batch::{Batch, InFlight, run_alone};
+use super::estimator::{begin_sample, is_without_turn};
+use super::tiles::{Tile, TileWork, tiles};
+use crate::film::{Film, Sample, guide_add, pixel_add_real};
 use crate::packed::{ESTIMATOR_PAPER, PackedScene};
 use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
-
-/// Pixels a task renders before it looks for cancellation.
-const TILE_PIXELS: usize = 512;
 
 /// Takes the samples of `work` and adds them to the film; the rays traced. A cancelled render leaves whole pixels only: each has taken all of
 /// its samples or none.
@@ -21,229 +18,101 @@ pub fn render(
     work: &WorkList,
     watcher: &Watcher<'_>,
 ) -> RayCounts {
+    let fill = |batch: &mut Batch, mut tile: Tile<'_>, tile_work: &TileWork| {
+        let mut rays = RayCounts::default();
+        for block in tile_work.blocks() {
+            rays += render_block(scene, &mut tile, work.pass, block, batch);
+        }
+        watcher.taken(tile_work.samples());
+        rays
+    };
     tiles(film, &work.pixels)
         .into_par_iter()
-        .map(|mut tile| {
-            let mut rays = RayCounts::default();
+        .map_init(Batch::default, |batch, (tile, work)| {
             if watcher.is_cancelled() {
-                return rays;
+                RayCounts::default()
+            } else {
+                fill(batch, tile, &work)
             }
-            for pixel in tile.work {
-                match work.pass {
-                    Pass::Main => tile.main_samples(scene, pixel, &mut rays),
-                    Pass::Real => tile.real_samples(scene, pixel, &mut rays),
-                }
-            }
-            let samples = tile.work.iter().map(|pixel| u64::from(pixel.samples()));
-            watcher.taken(samples.sum());
-            rays
         })
         .sum()
 }
 
-/// Neighbouring pixels of a film, with their work.
-struct Tile<'a> {
-    first_pixel: usize,
-    sums: &'a mut [PixelSums],
-    /// Empty where the film has none.
-    guides: &'a mut [GuideSums],
-    work: &'a [PixelWork],
-}
-
-/// The tiles that have work.
-fn tiles<'a>(film: &'a mut Film, mut work: &'a [PixelWork]) -> Vec<Tile<'a>> {
-    let mut tiles = Vec::new();
-    let mut guides = film.guides.chunks_mut(TILE_PIXELS);
-    for (tile, sums) in film.pixels.chunks_mut(TILE_PIXELS).enumerate() {
-        let first_pixel = tile * TILE_PIXELS;
-        let end = first_pixel + sums.len();
-        let guides = guides.next().unwrap_or_default();
-        let (now, later) = work.split_at(work.partition_point(|w| (w.pixel as usize) < end));
-        work = later;
-        if !now.is_empty() {
-            tiles.push(Tile {
-                first_pixel,
-                sums,
-                guides,
-                work: now,
-            });
-        }
-    }
-    tiles
-}
-
-impl Tile<'_> {
-    fn main_samples(&mut self, scene: &PackedScene, work: &PixelWork, rays: &mut RayCounts) {
-        let at = work.pixel as usize - self.first_pixel;
-        let sums = &mut self.sums[at];
-        let mut index = work.first;
-        while index < work.end {
-            let idle = samples_without_turn(scene, work.pixel, index, work.end);
-            if idle > 0 {
-                sums.add_nothing(idle);
-                index += idle;
+/// The samples of a block's pixels, index by index. A pixel's samples are added in their order, whatever else is in flight.
+fn render_block(
+    scene: &PackedScene,
+    tile: &mut Tile<'_>,
+    pass: Pass,
+    block: &[PixelWork],
+    batch: &mut Batch,
+) -> RayCounts {
+    let mut rays = RayCounts::default();
+    let first = block.iter().map(|work| work.first).min().unwrap_or(0);
+    let end = block.iter().map(|work| work.end).max().unwrap_or(0);
+    for index in first..end {
+        for work in block {
+            if !(work.first..work.end).contains(&index) {
                 continue;
             }
-            main_sample(
-                scene,
-                work.pixel,
-                index,
-                sums,
-                self.guides.get_mut(at),
-                rays,
-            );
-            index += 1;
+            if pass == Pass::Main && is_without_turn(scene, work.pixel, index) {
+                tile.sums(work.pixel).add_nothing();
+            } else {
+                batch.generate(scene, work.pixel, index, pass == Pass::Real);
+            }
+        }
+        if batch.len() >= Batch::WORTH || index + 1 == end {
+            batch.run(scene);
+            for sample in batch.samples() {
+                rays += sample.state.rays;
+                add_sample(scene, tile, pass, sample);
+            }
+            batch.clear();
         }
     }
-
-    fn real_samples(&mut self, scene: &PackedScene, work: &PixelWork, rays: &mut RayCounts) {
-        let sums = &mut self.sums[work.pixel as usize - self.first_pixel];
-        for index in work.first..work.end {
-            let mut st = begin_sample(scene, work.pixel, index, true);
-            run(scene, &mut st, rays);
-            let real = st.result.radiance * scene.frame.exposure_scale;
-            pixel_add_real(sums, index, st.result.mask != 0, real);
-        }
-    }
+    rays
 }
 
-fn main_sample(
-    scene: &PackedScene,
-    pixel: u32,
-    index: u32,
-    sums: &mut PixelSums,
-    guide: Option<&mut GuideSums>,
-    rays: &mut RayCounts,
-) {
-    let mut st = begin_sample(scene, pixel, index, false);
-    run(scene, &mut st, rays);
+fn add_sample(scene: &PackedScene, tile: &mut Tile<'_>, pass: Pass, sample: &InFlight) {
+    let InFlight { index, state: st } = sample;
+    let pixel = st.path.pixel;
     let scale = scene.frame.exposure_scale;
     let is_virtual = st.result.mask != 0;
-    let (contribution, real) = if scene.frame.estimator == ESTIMATOR_PAPER {
-        let real = st.radiance_real * scale;
-        (
-            if is_virtual {
-                st.result.radiance * scale
-            } else {
-                (st.result.radiance - st.radiance_real) * scale
-            },
-            Some(real),
-        )
+    let radiance = st.result.radiance * scale;
+    if pass == Pass::Real {
+        pixel_add_real(tile.sums(pixel), *index, is_virtual, radiance);
+        return;
+    }
+    let (contribution, real) = if scene.frame.estimator != ESTIMATOR_PAPER {
+        (radiance, None)
+    } else if is_virtual {
+        (radiance, Some(st.radiance_real * scale))
     } else {
-        (st.result.radiance * scale, None)
+        let difference = (st.result.radiance - st.radiance_real) * scale;
+        (difference, Some(st.radiance_real * scale))
     };
-    sums.add(
-        index,
-        &Sample {
-            is_virtual,
-            contribution,
-            real,
-        },
-    );
+    let sample = Sample {
+        is_virtual,
+        contribution,
+        real,
+    };
+    tile.sums(pixel).add(*index, &sample);
     let hit = &st.first_hit;
-    if let Some(sums) = guide
-        && hit.depth_m.is_finite()
+    if hit.depth_m.is_finite()
+        && let Some(sums) = tile.guide(pixel)
     {
         guide_add(sums, hit.depth_m, hit.normal, hit.albedo);
     }
 }
 
-/// Takes a sample to its end, where it stands: its state is too large to be moved for nothing.
-fn run(scene: &PackedScene, st: &mut PathState, rays: &mut RayCounts) {
-    while st.path.stage != STAGE_DONE {
-        answer(scene, st);
-        advance(scene, st);
-    }
-    *rays += st.rays;
-}
-
 /// Real radiance of one sample before exposure, and the albedo of its first hit (0 where nothing is hit); wants `FRAME_AOVS`.
 pub fn render_first_hit(scene: &PackedScene, pixel: u32, index: u32) -> (Vec3, Vec3) {
     let mut st = begin_sample(scene, pixel, index, true);
-    run(scene, &mut st, &mut RayCounts::default());
+    run_alone(scene, &mut st);
     (st.result.radiance, st.first_hit.albedo)
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::atomic::{AtomicU32, Ordering};
+pub(super) use tests::scene as test_scene;
 
-    use super::*;
-    use crate::pack::{test_mesh, test_scene};
-    use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
-    use crate::scene::{Environment, EnvironmentMap, Material, Side};
-
-    /// A square before half of a bright sky, six tiles.
-    fn scene() -> PackedScene {
-        let mut scene = test_scene();
-        let camera = &mut scene.camera;
-        (camera.width, camera.height) = (64, 48);
-        (camera.fx, camera.fy, camera.cx, camera.cy) = (64.0, 64.0, 32.0, 24.0);
-        let corners = [
-            [0.0, -1.0, -1.0],
-            [1.0, -1.0, -1.0],
-            [1.0, 1.0, -1.0],
-            [0.0, 1.0, -1.0],
-        ];
-        let triangles = [[0, 1, 2], [0, 2, 3]];
-        scene.objects = vec![test_mesh(
-            Side::Virtual,
-            &corners,
-            &triangles,
-            Material::default(),
-        )];
-        scene.environment = Some(Environment {
-            map: EnvironmentMap::Constant([1.0; 3]),
-            rotation_deg: 0.0,
-            scale: 1.0,
-        });
-        let mut packed = PackedScene::build(&scene).expect("packs");
-        packed.pixels = vec![PixelInfo::uniform(PIXEL_BEAM_MAY_MEET_VIRTUAL); 64 * 48];
-        packed
-    }
-
-    #[test]
-    fn a_cancelled_render_leaves_whole_pixels_and_what_is_left_completes_it() {
-        let scene = scene();
-        for with_guides in [false, true] {
-            let empty = Film::new(64, 48, 0, with_guides);
-            let work = WorkList::main(&scene.pixels, &empty, |row| 1 + row as u32 % 3);
-            let mut whole = empty.clone();
-            let rays = render(&scene, &mut whole, &work, &Watcher::none());
-
-            let mut film = empty.clone();
-            let asked = AtomicU32::new(0);
-            let after_two_tiles = || asked.fetch_add(1, Ordering::Relaxed) > 1;
-            let watcher = Watcher::none().cancelled_by(&after_two_tiles);
-            let mut again = render(&scene, &mut film, &work, &watcher);
-            for work in &work.pixels {
-                let n = film.pixels[work.pixel as usize].n;
-                assert!(n == 0 || n == work.samples());
-            }
-            let left = work.left(&film);
-            assert_eq!(left.pixels.len(), work.pixels.len() - 2 * TILE_PIXELS);
-            assert!(film != whole, "control: it was cancelled");
-            again += render(&scene, &mut film, &left, &Watcher::none());
-            assert!(film == whole && again == rays);
-            assert!(work.left(&film).is_empty());
-        }
-    }
-
-    #[test]
-    fn real_samples_follow_in_any_portions() {
-        let scene = scene();
-        let mut film = Film::new(64, 48, 0, false);
-        let main = WorkList::main(&scene.pixels, &film, |_| 8);
-        render(&scene, &mut film, &main, &Watcher::none());
-        let mut whole = film.clone();
-        let real = |film: &Film, end| WorkList::real(&scene.pixels, film, true, |_| end);
-        let all = real(&film, 8);
-        render(&scene, &mut whole, &all, &Watcher::none());
-        for end in [3, 8] {
-            assert!(film != whole, "control: something is missing");
-            let part = real(&film, end);
-            render(&scene, &mut film, &part, &Watcher::none());
-        }
-        assert!(film == whole);
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -6,6 +6,7 @@ use crate::material::surface_alpha;
 use crate::math::{hash_combine, length3, uniform_from_bits};
 use crate::packed::{
     FRAME_ALPHA, FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, NONE, PackedScene,
+    SIDE_REAL, SIDE_VIRTUAL,
 };
 use crate::shared::shared;
 
@@ -13,23 +14,21 @@ shared! {
     /// A ray that meets this many transparent layers ends at the last.
     const MAX_ALPHA_LAYERS: u32 = 64;
 
-    pub const WORLD_REAL: u32 = 0;
-    pub const WORLD_VIRTUAL: u32 = 1;
     /// The request is answered.
     const QUERY_NONE: u32 = 2;
     /// A length below it is none.
     const MIN_POSITIVE: f32 = f32::MIN_POSITIVE;
-}
 
-/// One query of a request: a world and how far.
-struct Query {
-    world: u32,
-    any_hit: bool,
-    t_max: f32,
-    /// The answer goes to the real world's hit rather than the virtual one's.
-    to_real: bool,
-    /// With it the request is answered.
-    is_last: bool,
+    /// One query of a request: a world and how far.
+    value struct Query {
+        world: u32,
+        any_hit: bool,
+        t_max: f32,
+        /// The answer goes to the real world's hit rather than the virtual one's.
+        to_real: bool,
+        /// With it the request is answered.
+        is_last: bool,
+    }
 }
 
 #[inline]
@@ -38,7 +37,7 @@ fn query(world: u32, any_hit: bool, t_max: f32, is_last: bool) -> Query {
         world,
         any_hit,
         t_max,
-        to_real: world == WORLD_REAL,
+        to_real: world == SIDE_REAL,
         is_last,
     }
 }
@@ -49,31 +48,31 @@ fn next_query(scene: &PackedScene, request: u32, step: u32, t_max: f32, hits: &H
     let met_real = hits.in_real.triangle != NONE;
     let met_virtual = hits.in_virtual.triangle != NONE;
     match (request, step) {
-        (REQUEST_CLOSEST_VIRTUAL, 0) => query(WORLD_VIRTUAL, false, t_max, true),
-        (REQUEST_CLOSEST_REAL, 0) => query(WORLD_REAL, false, t_max, true),
-        (REQUEST_CLOSEST_MIXED, 0) => query(WORLD_VIRTUAL, false, t_max, false),
-        (REQUEST_CLOSEST_MIXED, 1) => query(WORLD_REAL, false, hits.in_virtual.t, true),
-        (REQUEST_CLOSEST_EACH, 0) => query(WORLD_VIRTUAL, false, t_max, false),
-        (REQUEST_CLOSEST_EACH, 1) => query(WORLD_REAL, false, t_max, true),
-        (REQUEST_VIRTUAL_THEN_REAL, 0) => query(WORLD_VIRTUAL, false, t_max, false),
-        (REQUEST_VIRTUAL_THEN_REAL, 1) if met_virtual => query(WORLD_REAL, false, t_max, true),
-        (REQUEST_REAL_UNLESS_COVERED, 0) => query(WORLD_REAL, false, t_max, false),
+        (REQUEST_CLOSEST_VIRTUAL, 0) => query(SIDE_VIRTUAL, false, t_max, true),
+        (REQUEST_CLOSEST_REAL, 0) => query(SIDE_REAL, false, t_max, true),
+        (REQUEST_CLOSEST_MIXED, 0) => query(SIDE_VIRTUAL, false, t_max, false),
+        (REQUEST_CLOSEST_MIXED, 1) => query(SIDE_REAL, false, hits.in_virtual.t, true),
+        (REQUEST_CLOSEST_EACH, 0) => query(SIDE_VIRTUAL, false, t_max, false),
+        (REQUEST_CLOSEST_EACH, 1) => query(SIDE_REAL, false, t_max, true),
+        (REQUEST_VIRTUAL_THEN_REAL, 0) => query(SIDE_VIRTUAL, false, t_max, false),
+        (REQUEST_VIRTUAL_THEN_REAL, 1) if met_virtual => query(SIDE_REAL, false, t_max, true),
+        (REQUEST_REAL_UNLESS_COVERED, 0) => query(SIDE_REAL, false, t_max, false),
         (REQUEST_REAL_UNLESS_COVERED, 1) if met_real => {
             let covering = hits.in_real.t * (1.0 + COINCIDENCE);
-            query(WORLD_VIRTUAL, true, covering, true)
+            query(SIDE_VIRTUAL, true, covering, true)
         }
-        (REQUEST_SHADOW_MIXED, 0) => query(WORLD_VIRTUAL, true, t_max, false),
-        (REQUEST_SHADOW_MIXED, 1) if !met_virtual => query(WORLD_REAL, true, t_max, true),
-        (REQUEST_SHADOW_REAL, 0) => query(WORLD_REAL, true, t_max, true),
-        (REQUEST_SHADOW_DIFFERENCE, 0) => query(WORLD_VIRTUAL, true, t_max, false),
+        (REQUEST_SHADOW_MIXED, 0) => query(SIDE_VIRTUAL, true, t_max, false),
+        (REQUEST_SHADOW_MIXED, 1) if !met_virtual => query(SIDE_REAL, true, t_max, true),
+        (REQUEST_SHADOW_REAL, 0) => query(SIDE_REAL, true, t_max, true),
+        (REQUEST_SHADOW_DIFFERENCE, 0) => query(SIDE_VIRTUAL, true, t_max, false),
         (REQUEST_SHADOW_DIFFERENCE, 1) if met_virtual || asks_both(scene) => {
-            query(WORLD_REAL, true, t_max, true)
+            query(SIDE_REAL, true, t_max, true)
         }
-        (REQUEST_SHADOW_PAIR, 0) => query(WORLD_REAL, true, t_max, false),
-        (REQUEST_SHADOW_PAIR, 1) => query(WORLD_VIRTUAL, true, t_max, false),
+        (REQUEST_SHADOW_PAIR, 0) => query(SIDE_REAL, true, t_max, false),
+        (REQUEST_SHADOW_PAIR, 1) => query(SIDE_VIRTUAL, true, t_max, false),
         (REQUEST_SHADOW_PAIR, 2) if !met_virtual => Query {
             to_real: false,
-            ..query(WORLD_REAL, true, t_max, true)
+            ..query(SIDE_REAL, true, t_max, true)
         },
         _ => query(QUERY_NONE, false, 0.0, true),
     }
@@ -171,7 +170,7 @@ pub fn answer(scene: &PackedScene, st: &mut PathState) {
 /// One world's nearest hit, or any: then only whether there is one means anything.
 #[inline]
 fn trace(scene: &PackedScene, ray: &Ray, world: u32, any_hit: bool) -> Hit {
-    let bvh = if world == WORLD_REAL {
+    let bvh = if world == SIDE_REAL {
         &scene.real_bvh
     } else {
         &scene.virtual_bvh
@@ -198,7 +197,7 @@ fn ray_into(ray: &PathRay, world: u32, t_max: f32) -> Ray {
         } else {
             offset
         }
-    } else if world == WORLD_REAL {
+    } else if world == SIDE_REAL {
         offset * ray.origin.coincidence_ratio
     } else {
         -offset * ray.origin.coincidence_ratio
@@ -213,7 +212,7 @@ fn ray_into(ray: &PathRay, world: u32, t_max: f32) -> Ray {
     Ray {
         origin: ray.origin.position + shift,
         direction,
-        t_min: if world == WORLD_REAL {
+        t_min: if world == SIDE_REAL {
             ray.origin.real_t_min
         } else {
             0.0

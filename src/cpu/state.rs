@@ -9,7 +9,7 @@ use glam::Vec3;
 use crate::accel::Hit;
 use crate::packed::NONE;
 use crate::shared::shared;
-use crate::work::RayCounts;
+use crate::work::SampleRays;
 
 shared! {
     /// Finished; the results stand in the accumulators.
@@ -32,6 +32,7 @@ shared! {
     pub const STAGE_DIFFERENCE_BSDF: u32 = 8;
     /// Real pass: waiting for both worlds along the primary ray.
     pub const STAGE_REAL_PASS: u32 = 9;
+    pub const STAGE_COUNT: u32 = 10;
 
     /// Path through real and virtual geometry.
     pub const MODE_MIXED: u32 = 0;
@@ -82,6 +83,8 @@ shared! {
     pub const EVENT_VIRTUAL_CHAIN: u32 = 4;
     /// Since it last did so it has met smooth real surfaces.
     pub const EVENT_REAL_CHAIN: u32 = 8;
+    /// The present vertex of a difference is polished.
+    pub const EVENT_AT_POLISHED: u32 = 16;
 
     /// Density that stands for a delta distribution: no other technique can find its directions.
     pub const DELTA_DENSITY: f32 = -1.0;
@@ -117,7 +120,7 @@ shared! {
         pub t_max: f32,
         /// `REQUEST_*`.
         pub request: u32,
-        /// World of the vertex that it leaves: 0 real, 1 virtual, [`SIDE_NONE`].
+        /// World of the vertex that it leaves: `SIDE_REAL`, `SIDE_VIRTUAL` or [`SIDE_NONE`].
         pub side: u32,
         /// Surface interactions up to and including the vertex that it leaves.
         pub depth: u32,
@@ -231,7 +234,7 @@ pub struct PathState {
     pub first_hit: FirstHit,
     /// The vertex to be shaded next.
     pub vertex_hit: Hit,
-    pub rays: RayCounts<u32>,
+    pub rays: SampleRays,
 }
 
 /// A ray that met nothing.
@@ -308,6 +311,6 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
             pad: 0,
         },
         vertex_hit: MISS,
-        rays: RayCounts::default(),
+        rays: SampleRays::default(),
     }
 }

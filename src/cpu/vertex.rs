@@ -9,16 +9,17 @@ use crate::light::blocking::light_may_be_blocked;
 use crate::light::cones::{
     Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres,
 };
+use crate::light::environment::share_left_to_eye;
 use crate::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 use crate::material::{
-    Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_passes_straight,
-    bsdf_sample,
+    Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_is_polished,
+    bsdf_passes_straight, bsdf_sample,
 };
 use crate::math::{dot3, exp_, safe_sqrt};
 use crate::packed::{
     ESTIMATOR_PAPER, FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES,
-    FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE,
-    PackedScene,
+    FRAME_NO_LAST_VERTEX, LIGHT_ENVIRONMENT, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED,
+    MATERIAL_UNLIT, NONE, PackedScene, SIDE_REAL, SIDE_VIRTUAL,
 };
 use crate::shared::shared;
 
@@ -84,6 +85,9 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     }
     stand_at(scene, st, s, distance);
 
+    if difference && bsdf_is_polished(s) {
+        st.path.events |= EVENT_AT_POLISHED;
+    }
     let techniques = difference.then(|| techniques_at(scene, st, s, wo));
     next_event(scene, st, s, wo, techniques.as_ref());
     if lights_suffice(scene, st, s) {
@@ -97,8 +101,13 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
 
 /// The next rays leave the vertex.
 pub fn stand_at(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: f32) {
-    let side = u32::from(st.vertex_hit.triangle >= scene.frame.real_triangle_count);
-    let leaves_coinciding_real = side == 1 && st.ray.side == 0 && coincides(st, s, distance);
+    let side = if st.vertex_hit.triangle < scene.frame.real_triangle_count {
+        SIDE_REAL
+    } else {
+        SIDE_VIRTUAL
+    };
+    let leaves_coinciding_real =
+        side == SIDE_VIRTUAL && st.ray.side == SIDE_REAL && coincides(st, s, distance);
     let reach = 1.0 + COINCIDENCE * distance / s.error;
     st.ray.origin = RayOrigin {
         position: s.position,
@@ -214,10 +223,22 @@ fn next_event(
         return;
     }
     let l = light_sample(scene, index, s.position, u.pair());
-    let contribution = light_contribution(scene, st, s, wo, techniques, &l);
+    let mut contribution = light_contribution(scene, st, s, wo, techniques, &l);
+    if vertex_left_to_photons(scene, st, s) {
+        contribution *= light_left_to_eye(scene, index, l.direction);
+    }
     if contribution != Vec3::ZERO {
         plan_shadow(st, s, &l, contribution);
     }
+}
+
+/// Share of a light from `direction` that the eye's paths bring by way of smooth and polished virtual surfaces.
+fn light_left_to_eye(scene: &PackedScene, index: u32, direction: Vec3) -> f32 {
+    let light = &scene.lights[index as usize];
+    if light.kind == LIGHT_ENVIRONMENT {
+        return share_left_to_eye(scene, direction);
+    }
+    if light.photon_pdf > 0.0 { 0.0 } else { 1.0 }
 }
 
 /// What a drawn light adds if nothing hides it (or, for the difference, if only something virtual does); zero if that cannot be.
@@ -230,7 +251,7 @@ fn light_contribution(
     l: &LightSample,
 ) -> Vec3 {
     let difference = is_difference(st);
-    let real_light = l.side == 0;
+    let real_light = l.side == SIDE_REAL;
     if l.pdf <= 0.0 || (st.path.mode == MODE_REAL && !real_light) {
         return Vec3::ZERO;
     }
@@ -269,7 +290,7 @@ fn plan_shadow(st: &mut PathState, s: &Surface, l: &LightSample, contribution: V
     } else {
         f32::INFINITY
     };
-    let real_light = l.side == 0;
+    let real_light = l.side == SIDE_REAL;
     st.ray.request = match st.path.mode {
         MODE_DIFFERENCE if real_light => REQUEST_SHADOW_DIFFERENCE,
         MODE_REAL => REQUEST_SHADOW_REAL,
@@ -362,7 +383,8 @@ fn plan_continuation(
     let events = if straight {
         st.path.events
     } else {
-        events_after(st.path.events, st.ray.depth, st.ray.side, b.delta)
+        let smooth = b.delta || bsdf_is_polished(s);
+        events_after(st.path.events, st.ray.depth, st.ray.side, smooth)
     };
     let mut segment = Segment {
         direction: b.wi,

@@ -1,5 +1,6 @@
 //! OpenEXR: the header is read and held against the limits first, then only the channels that are wanted are decoded.
 
+use crate::refusal::Refusal;
 use std::collections::HashSet;
 use std::io::Cursor;
 use std::path::Path;
@@ -24,25 +25,25 @@ const LEAST_BLOCK_BYTES: usize = 16;
 impl ChannelFile {
     /// # Errors
     /// Why it cannot be read, in one line that begins with the path.
-    pub fn read(path: &Path) -> Result<Self, String> {
+    pub fn read(path: &Path) -> Result<Self, Refusal> {
         let read = || {
             let bytes = read_file(path, MAX_PICTURE_BYTES).map_err(|reason| {
                 format!("it cannot be read ({reason}); expected an .exr file; correct the path or the rights")
             })?;
             Self::decode(&bytes)
         };
-        read().map_err(|problem| format!("{}: {problem}", path.display()))
+        read().map_err(|problem: Refusal| format!("{}: {problem}", path.display()).into())
     }
 
     /// Decodes the bytes of an OpenEXR file.
     ///
     /// # Errors
     /// Why they cannot be used, in one line.
-    pub fn decode(bytes: &[u8]) -> Result<Self, String> {
+    pub fn decode(bytes: &[u8]) -> Result<Self, Refusal> {
         if !bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-            return Err("it is no OpenEXR file; expected .exr; convert it".to_owned());
+            return Err("it is no OpenEXR file; expected .exr; convert it".into());
         }
-        guarded(|| read_channels(bytes)).unwrap_or_else(|thrown| Err(broken(thrown)))
+        Ok(guarded(|| read_channels(bytes)).unwrap_or_else(|thrown| Err(broken(thrown)))?)
     }
 }
 
@@ -396,3 +397,6 @@ fn is_rec709(c: &Chromaticities) -> bool {
         .zip(rec709)
         .all(|(given, rec709)| (given - rec709).abs() < 1e-3)
 }
+
+#[cfg(test)]
+mod tests;

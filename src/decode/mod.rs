@@ -6,8 +6,6 @@
 mod channels;
 mod codes;
 mod exr;
-#[cfg(test)]
-mod exr_test;
 mod file;
 mod guard;
 mod hdr;

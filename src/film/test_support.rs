@@ -1,4 +1,4 @@
-//! Films filled by hand.
+//! Films filled by hand, and numbers to fill them with.
 
 use glam::Vec3;
 
@@ -16,4 +16,13 @@ impl Film {
         let index = self.first_index(pixel) + self.pixels[pixel].n_real;
         pixel_add_real(&mut self.pixels[pixel], index, is_virtual, real);
     }
+}
+
+/// In [0, 1), the same on every run.
+pub(crate) fn noise(i: u32) -> f32 {
+    let mut x = i.wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x7feb_352d);
+    x ^= x >> 15;
+    (x >> 8) as f32 / 16_777_216.0
 }

@@ -3,14 +3,19 @@
 use bytemuck::Zeroable;
 
 use super::{GpuDevice, GpuError};
-use crate::packed::{Frame, Light, Material, PackedScene, PixelInfo, TextureRef, Triangle, Vertex};
+use crate::accel::WorldBvh;
+use crate::packed::{
+    Frame, Light, Material, PackedScene, PixelInfo, Resting, TextureRef, Triangle, Vertex,
+};
 
-/// What an edit has changed in a packed scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What an edit has changed in a packed scene; each includes those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Changed {
     /// Camera, lens, sampling, and what the photograph tells of the albedo.
     View,
-    /// The virtual world and the lights too.
+    /// Where the moving virtual objects are, and the lights.
+    Moving,
+    /// All of the virtual world.
     Virtual,
     All,
 }
@@ -19,8 +24,11 @@ pub enum Changed {
 #[derive(Clone, Copy)]
 pub struct SceneParts<'a> {
     pub frame: Frame,
+    /// Those that move are the last.
     pub triangles: &'a [Triangle],
     pub vertices: &'a [Vertex],
+    /// How many triangles and vertices rest.
+    pub resting: Resting,
     pub materials: &'a [Material],
     pub texture_refs: &'a [TextureRef],
     pub texels: &'a [u32],
@@ -29,9 +37,10 @@ pub struct SceneParts<'a> {
     pub env_cdf: &'a [f32],
     pub photo_albedo: &'a [[f32; 4]],
     pub pixels: &'a [PixelInfo],
-    /// Both worlds, the real one first.
-    pub bvh_nodes: [&'a [[u32; 4]]; 2],
-    pub bvh_leaves: [&'a [[f32; 4]]; 2],
+    /// Both worlds, the real one first, each as [`WorldBvh::gpu_nodes`].
+    pub bvh_nodes: [[&'a [[[u32; 4]; 5]]; 3]; 2],
+    /// As [`WorldBvh::gpu_leaves`].
+    pub bvh_leaves: [[&'a [[f32; 4]]; 2]; 2],
 }
 
 impl Default for SceneParts<'_> {
@@ -40,6 +49,7 @@ impl Default for SceneParts<'_> {
             frame: Frame::zeroed(),
             triangles: &[],
             vertices: &[],
+            resting: Resting::default(),
             materials: &[],
             texture_refs: &[],
             texels: &[],
@@ -48,8 +58,8 @@ impl Default for SceneParts<'_> {
             env_cdf: &[],
             photo_albedo: &[],
             pixels: &[],
-            bvh_nodes: [&[], &[]],
-            bvh_leaves: [&[], &[]],
+            bvh_nodes: [[&[]; 3]; 2],
+            bvh_leaves: [[&[]; 2]; 2],
         }
     }
 }
@@ -61,6 +71,7 @@ impl<'a> From<&'a PackedScene> for SceneParts<'a> {
             frame: scene.frame,
             triangles: &scene.triangles,
             vertices: &scene.vertices,
+            resting: scene.resting,
             materials: &scene.materials,
             texture_refs: &scene.texture_refs,
             texels: &scene.texels,
@@ -69,8 +80,8 @@ impl<'a> From<&'a PackedScene> for SceneParts<'a> {
             env_cdf: &scene.env_cdf,
             photo_albedo: &scene.photo_albedo,
             pixels: &scene.pixels,
-            bvh_nodes: worlds.map(|bvh| bytemuck::cast_slice(bvh.gpu_nodes())),
-            bvh_leaves: worlds.map(|bvh| bvh.gpu_leaves()),
+            bvh_nodes: worlds.map(WorldBvh::gpu_nodes),
+            bvh_leaves: worlds.map(WorldBvh::gpu_leaves),
         }
     }
 }
@@ -119,9 +130,7 @@ impl SceneBuffers {
             return false;
         }
         for ((_, buffer), array) in self.arrays.iter().zip(&arrays) {
-            if array.changed_by == Changed::View || array.changed_by == changed {
-                array.write(gpu, buffer);
-            }
+            array.write(gpu, buffer, changed);
         }
         self.set_frame(gpu, parts);
         true
@@ -143,43 +152,46 @@ impl SceneBuffers {
     }
 }
 
-/// One array of a packed scene, in up to two pieces.
+/// One array of a packed scene, in pieces.
 struct Array<'a> {
     /// In the shaders.
     name: &'static str,
     /// In messages.
     what: &'static str,
-    /// The smallest edit that changes it.
-    changed_by: Changed,
-    pieces: [&'a [u8]; 2],
+    pieces: Vec<Piece<'a>>,
 }
+
+/// Bytes, and the smallest edit that changes them.
+type Piece<'a> = (Changed, &'a [u8]);
 
 impl Array<'_> {
     /// Bytes.
     fn len(&self) -> u64 {
-        let [first, second] = self.pieces;
-        (first.len() + second.len()) as u64
+        (self.pieces.iter())
+            .map(|(_, bytes)| bytes.len() as u64)
+            .sum()
     }
 
-    fn write(&self, gpu: &GpuDevice, buffer: &wgpu::Buffer) {
-        let [first, second] = self.pieces;
-        gpu.queue.write_buffer(buffer, 0, first);
-        gpu.queue.write_buffer(buffer, first.len() as u64, second);
+    /// Sends the pieces that an edit has changed.
+    fn write(&self, gpu: &GpuDevice, buffer: &wgpu::Buffer, changed: Changed) {
+        let mut offset = 0;
+        for (changed_by, bytes) in &self.pieces {
+            if *changed_by <= changed {
+                gpu.queue.write_buffer(buffer, offset, bytes);
+            }
+            offset += bytes.len() as u64;
+        }
     }
 }
 
 fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 12] {
-    use Changed::{All, View, Virtual};
-    let array = |name, what, changed_by, pieces| Array {
-        name,
-        what,
-        changed_by,
-        pieces,
-    };
+    use Changed::{All, Moving, View, Virtual};
+    let array = |name, what, pieces| Array { name, what, pieces };
     let SceneParts {
         frame: _,
         triangles,
         vertices,
+        resting,
         materials,
         texture_refs,
         texels,
@@ -188,51 +200,74 @@ fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 12] {
         env_cdf,
         photo_albedo,
         pixels,
-        bvh_nodes,
-        bvh_leaves,
+        bvh_nodes: [[real_roots, real_nodes, _], [roots, nodes, moving_nodes]],
+        bvh_leaves: [[real_leaves, _], [leaves, moving_leaves]],
     } = *parts;
+    let triangles = triangles.split_at(resting.triangles);
+    let vertices = vertices.split_at(resting.vertices);
     [
-        array("triangles", "triangles", Virtual, one(triangles)),
-        array("vertices", "vertices", Virtual, one(vertices)),
-        array("materials", "materials", Virtual, one(materials)),
-        array("texture_refs", "textures", All, one(texture_refs)),
-        array("texels", "texels", All, one(texels)),
-        array("lights", "lights", Virtual, one(lights)),
-        array("env_texels", "environment map", All, one(env_texels)),
-        array("env_cdf", "environment table", All, one(env_cdf)),
+        array(
+            "triangles",
+            "triangles",
+            vec![piece(Virtual, triangles.0), piece(Moving, triangles.1)],
+        ),
+        array(
+            "vertices",
+            "vertices",
+            vec![piece(Virtual, vertices.0), piece(Moving, vertices.1)],
+        ),
+        array("materials", "materials", vec![piece(Virtual, materials)]),
+        array("texture_refs", "textures", vec![piece(All, texture_refs)]),
+        array("texels", "texels", vec![piece(All, texels)]),
+        array("lights", "lights", vec![piece(Moving, lights)]),
+        array(
+            "env_texels",
+            "environment map",
+            vec![piece(All, env_texels)],
+        ),
+        array("env_cdf", "environment table", vec![piece(All, env_cdf)]),
         array(
             "photo_albedo",
             "albedo of the photograph",
-            View,
-            one(photo_albedo),
+            vec![piece(View, photo_albedo)],
         ),
-        array("pixels", "pixels", View, one(pixels)),
+        array("pixels", "pixels", vec![piece(View, pixels)]),
         array(
             "bvh_nodes",
             "BVH nodes",
-            Virtual,
-            bvh_nodes.map(bytemuck::cast_slice),
+            vec![
+                piece(All, real_roots),
+                piece(All, real_nodes),
+                piece(Moving, roots),
+                piece(Virtual, nodes),
+                piece(Moving, moving_nodes),
+            ],
         ),
         array(
             "bvh_leaves",
             "BVH triangles",
-            Virtual,
-            bvh_leaves.map(bytemuck::cast_slice),
+            vec![
+                piece(All, real_leaves),
+                piece(Virtual, leaves),
+                piece(Moving, moving_leaves),
+            ],
         ),
     ]
 }
 
-/// Nodes are five vec4 each, leaves three a triangle.
-fn with_bases(parts: &SceneParts<'_>) -> Frame {
-    Frame {
-        virtual_node_base: (parts.bvh_nodes[0].len() / 5) as u32,
-        virtual_leaf_base: (parts.bvh_leaves[0].len() / 3) as u32,
-        ..parts.frame
-    }
+fn piece<T: bytemuck::NoUninit>(changed_by: Changed, records: &[T]) -> Piece<'_> {
+    (changed_by, bytemuck::cast_slice(records))
 }
 
-fn one<T: bytemuck::NoUninit>(records: &[T]) -> [&[u8]; 2] {
-    [bytemuck::cast_slice(records), &[]]
+/// The real world comes first, and nothing moves in it.
+fn with_bases(parts: &SceneParts<'_>) -> Frame {
+    let [[real_roots, real_nodes, _], _] = parts.bvh_nodes;
+    let [[real_leaves, _], _] = parts.bvh_leaves;
+    Frame {
+        virtual_node_base: (real_roots.len() + real_nodes.len()) as u32,
+        virtual_leaf_base: (real_leaves.len() / 3) as u32,
+        ..parts.frame
+    }
 }
 
 fn storage(gpu: &GpuDevice, array: &Array<'_>) -> wgpu::Buffer {
@@ -244,7 +279,7 @@ fn storage(gpu: &GpuDevice, array: &Array<'_>) -> wgpu::Buffer {
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
-    array.write(gpu, &buffer);
+    array.write(gpu, &buffer, Changed::All);
     buffer
 }
 

@@ -10,7 +10,7 @@ use super::kernel::Kernel;
 use super::{GpuDevice, GpuError};
 use crate::film::{GuideSums, PixelSums};
 use crate::shared::{WORKGROUP, shared};
-use crate::work::{PixelWork, RayCounts};
+use crate::work::{PixelWork, SampleRays};
 
 shared! {
     /// Uniform of a batch.
@@ -36,7 +36,7 @@ shared! {
     const COUNT_STEPS: u32 = word(offset_of!(Counters, steps));
     const COUNT_RAYS: u32 = word(offset_of!(Counters, rays));
     const COUNTERS: u32 = word(size_of::<Counters>());
-    const RAY_KINDS: u32 = word(size_of::<RayCounts<u32>>());
+    const RAY_KINDS: u32 = word(size_of::<SampleRays>());
 }
 
 const fn word(bytes: usize) -> u32 {
@@ -50,7 +50,7 @@ pub struct Counters {
     pub lanes_in: u32,
     pub lanes_out: u32,
     pub steps: u32,
-    pub rays: RayCounts<u32>,
+    pub rays: SampleRays,
 }
 
 pub const COUNTERS_BYTES: u64 = size_of::<Counters>() as u64;

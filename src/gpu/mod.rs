@@ -53,12 +53,4 @@ pub enum GpuError {
 }
 
 #[cfg(test)]
-pub(crate) mod layout_test;
-#[cfg(test)]
-mod traffic_test;
-#[cfg(test)]
-mod twins_test;
-#[cfg(test)]
-mod variants_test;
-#[cfg(test)]
-mod wavefront_test;
+pub(crate) mod tests;

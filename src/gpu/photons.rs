@@ -148,8 +148,8 @@ impl Photons {
             let list = self.list(gpu, listed)?;
             film.add_splats(count, list.into_iter().map(Splat::from));
             *rays += RayCounts {
-                mixed,
-                mixed_shadow,
+                mixed: mixed.into(),
+                mixed_shadow: mixed_shadow.into(),
                 ..RayCounts::default()
             };
             first += count;

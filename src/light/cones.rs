@@ -21,20 +21,28 @@ shared! {
     const SPHERE_PADDING_DISTANCE2: f32 = 2e-10;
     /// The largest cosine in a cone is overestimated by more than its rounding, so that no cone that reaches above the horizon counts as below.
     const COSINE_PADDING: f32 = 1e-6;
-}
 
-/// One sphere seen from a point.
-#[derive(Clone, Copy, Default)]
-struct Cone {
-    /// Unit, to the centre.
-    axis: Vec3,
-    /// Squared sine of the half-angle.
-    sin2: f32,
-    /// 1 - cos of the half-angle, without cancellation.
-    one_minus_cos: f32,
-    wide: bool,
-    /// Upper estimate of the cosine-weighted share of the hemisphere that it covers; 0 if it is wholly below the horizon.
-    weight: f32,
+    /// One sphere seen from a point.
+    #[derive(Clone, Copy, Default)]
+    value struct Cone {
+        /// Unit, to the centre.
+        axis: Vec3,
+        /// Squared sine of the half-angle.
+        sin2: f32,
+        /// 1 - cos of the half-angle, without cancellation.
+        one_minus_cos: f32,
+        wide: bool,
+        /// Upper estimate of the cosine-weighted share of the hemisphere that it covers; 0 if it is wholly below the horizon.
+        weight: f32,
+    }
+
+    /// A direction inside the cones.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub value struct ConeSample {
+        pub direction: Vec3,
+        /// Per solid angle, of the whole mixture; 0 if nothing virtual is above the horizon.
+        pub pdf: f32,
+    }
 }
 
 fn cone_of(frame: &Frame, i: u32, position: Vec3, ns: Vec3) -> Cone {
@@ -93,14 +101,6 @@ pub fn cones_at(frame: &Frame, position: Vec3, ns: Vec3) -> Cones {
         seen.total += seen.cones[i].weight;
     }
     seen
-}
-
-/// A direction inside the cones.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ConeSample {
-    pub direction: Vec3,
-    /// Per solid angle, of the whole mixture; 0 if nothing virtual is above the horizon.
-    pub pdf: f32,
 }
 
 /// Draws a direction: `choice` chooses the sphere, `u` the direction.

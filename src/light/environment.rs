@@ -10,14 +10,30 @@ use glam::Vec3;
 
 use crate::math::{PI, atan2_, luminance, safe_sqrt, sincos_2pi};
 use crate::packed::{Frame, PackedScene};
+use crate::shared::shared;
 
-/// A direction drawn from the environment.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EnvSample {
-    pub direction: Vec3,
-    pub radiance: Vec3,
-    /// Per solid angle; 0 if nothing could be drawn.
-    pub pdf: f32,
+shared! {
+    /// A direction drawn from the environment.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub value struct EnvSample {
+        pub direction: Vec3,
+        pub radiance: Vec3,
+        /// Per solid angle; 0 if nothing could be drawn.
+        pub pdf: f32,
+    }
+
+    /// The four texels around a point of the map and where it lies between them.
+    value struct Neighbours {
+        c00: Vec3,
+        c10: Vec3,
+        c01: Vec3,
+        c11: Vec3,
+        fx: f32,
+        /// Share of the row's angle above the point.
+        fy: f32,
+        /// Lower texel's row: the row of cells that the point lies in.
+        row: f32,
+    }
 }
 
 /// World direction to map coordinates in 0..1: u to the right from the left edge, v from the zenith down.
@@ -37,19 +53,6 @@ fn env_texel(scene: &PackedScene, i: u32, j: u32) -> Vec3 {
         scene.env_texels[at + 1],
         scene.env_texels[at + 2],
     )
-}
-
-/// The four texels around a point of the map and where it lies between them.
-struct Neighbours {
-    c00: Vec3,
-    c10: Vec3,
-    c01: Vec3,
-    c11: Vec3,
-    fx: f32,
-    /// Share of the row's angle above the point.
-    fy: f32,
-    /// Lower texel's row: the row of cells that the point lies in.
-    row: f32,
 }
 
 /// Upper and lower edge of a row of cells, as v.

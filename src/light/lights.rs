@@ -10,21 +10,24 @@ use crate::packed::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE,
     PackedScene, SIDE_REAL, xyz,
 };
+use crate::shared::shared;
 
-/// Light from one direction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightSample {
-    /// Unit, from the shaded point to the light.
-    pub direction: Vec3,
-    /// Metres; infinity for the environment and directional lights.
-    pub distance: f32,
-    /// Radiance, or for delta lights what multiplies f cos: intensity over distance squared, or irradiance.
-    pub radiance: Vec3,
-    /// Per solid angle, the probability of the light's choice included; for delta lights that probability alone. 0: nothing drawn.
-    pub pdf: f32,
-    pub delta: bool,
-    /// `SIDE_REAL` or `SIDE_VIRTUAL`.
-    pub side: u32,
+shared! {
+    /// Light from one direction.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub value struct LightSample {
+        /// Unit, from the shaded point to the light.
+        pub direction: Vec3,
+        /// Metres; infinity for the environment and directional lights.
+        pub distance: f32,
+        /// Radiance, or for delta lights what multiplies f cos: intensity over distance squared, or irradiance.
+        pub radiance: Vec3,
+        /// Per solid angle, the probability of the light's choice included; for delta lights that probability alone. 0: nothing drawn.
+        pub pdf: f32,
+        pub delta: bool,
+        /// `SIDE_REAL` or `SIDE_VIRTUAL`.
+        pub side: u32,
+    }
 }
 
 fn no_light() -> LightSample {

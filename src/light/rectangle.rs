@@ -14,24 +14,24 @@ shared! {
     const RIGHT_ANGLE: f32 = 1e-5;
     /// Coordinates are bounded by this many heights: beyond, the solid angle changes by less than 1 / FARTHEST.
     const FARTHEST: f32 = 3e4;
-}
 
-/// A rectangle seen from a point, in axes along its edges.
-pub struct Rectangle {
-    ex: Vec3,
-    ey: Vec3,
-    /// Normal on the emitting side.
-    ez: Vec3,
-    x0: f32,
-    x1: f32,
-    y0: f32,
-    y1: f32,
-    /// Of the point above the rectangle's plane, on the emitting side.
-    height: f32,
-    /// Steradians; 0 where it is not to be sampled by solid angle.
-    pub solid_angle: f32,
-    /// Signed solid angle between the foot of the perpendicular and the side at x0.
-    start: f32,
+    /// A rectangle seen from a point, in axes along its edges.
+    pub value struct Rectangle {
+        ex: Vec3,
+        ey: Vec3,
+        /// Normal on the emitting side.
+        ez: Vec3,
+        x0: f32,
+        x1: f32,
+        y0: f32,
+        y1: f32,
+        /// Of the point above the rectangle's plane, on the emitting side.
+        height: f32,
+        /// Steradians; 0 where it is not to be sampled by solid angle.
+        pub solid_angle: f32,
+        /// Signed solid angle between the foot of the perpendicular and the side at x0.
+        start: f32,
+    }
 }
 
 /// Whether the unit edges of a quad make a right angle.

@@ -1,6 +1,27 @@
 //! Fresnel reflectances: Schlick's for opaque surfaces, the exact one for surfaces that transmit.
 
+use crate::shared::shared;
 use glam::Vec3;
+
+shared! {
+    /// The ratio of the two indices that meet at an interface.
+    #[derive(Clone, Copy, Debug)]
+    pub value struct RelativeIndex {
+        /// Index beyond the interface over the index on the side of `wo`.
+        pub eta: f32,
+        /// eta^2 - 1, computed without cancellation so that indices near 1 keep their reflectance.
+        pub eta2_minus_1: f32,
+    }
+
+    #[derive(Clone, Copy, Debug)]
+    pub value struct DielectricFresnel {
+        /// Unpolarised reflectance, 1 under total internal reflection.
+        pub reflectance: f32,
+        /// eta times the cosine of the refracted direction; 0 under total internal reflection.
+        pub g: f32,
+        pub total: bool,
+    }
+}
 
 /// Schlick's approximation (1994): `f0` at normal incidence, 1 at grazing. `cos` is clamped to 0..1.
 pub fn schlick(f0: Vec3, cos: f32) -> Vec3 {
@@ -14,15 +35,6 @@ pub fn schlick(f0: Vec3, cos: f32) -> Vec3 {
 pub fn normal_reflectance(ior: f32) -> f32 {
     let r = (ior - 1.0) / (ior + 1.0);
     r * r
-}
-
-/// The ratio of the two indices that meet at an interface.
-#[derive(Clone, Copy, Debug)]
-pub struct RelativeIndex {
-    /// Index beyond the interface over the index on the side of `wo`.
-    pub eta: f32,
-    /// eta^2 - 1, computed without cancellation so that indices near 1 keep their reflectance.
-    pub eta2_minus_1: f32,
 }
 
 /// `entering`: `wo` is outside, in air. Indices below 0.001 are taken as 0.001.
@@ -40,15 +52,6 @@ pub fn relative_index(ior: f32, entering: bool) -> RelativeIndex {
             eta2_minus_1: -n2_minus_1 / (n * n),
         }
     }
-}
-
-#[derive(Clone, Copy, Debug)]
-pub struct DielectricFresnel {
-    /// Unpolarised reflectance, 1 under total internal reflection.
-    pub reflectance: f32,
-    /// eta times the cosine of the refracted direction; 0 under total internal reflection.
-    pub g: f32,
-    pub total: bool,
 }
 
 /// Exact unpolarised reflectance at `cos` >= 0 on the side of `wo`, in the form of Cook and Torrance (1982) with the difference

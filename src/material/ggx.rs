@@ -13,6 +13,17 @@ use super::normal::unit;
 shared! {
     /// Cosines between `wo` and the normal are taken as no smaller than this.
     pub const MIN_COS: f32 = 1e-7;
+
+    /// A reflection or transmission without its Fresnel factor.
+    #[derive(Clone, Copy, Debug)]
+    pub value struct GgxEval {
+        /// BSDF times |cos| of `wi`, Fresnel factor left out.
+        pub f_cos: f32,
+        /// Solid-angle density of `ggx_sample_half` followed by reflection or refraction.
+        pub pdf: f32,
+        /// Cosine between `wo` and the half vector.
+        pub cos_half: f32,
+    }
 }
 
 /// L(c) above, for c >= 0.
@@ -29,17 +40,6 @@ pub fn ggx_d(alpha: f32, normal: Vec3, sum: Vec3) -> f32 {
     let a2 = alpha * alpha;
     let t = (across.dot(across) / a2 + z * z) / sum.dot(sum);
     INV_PI / (a2 * t * t)
-}
-
-/// A reflection or transmission without its Fresnel factor.
-#[derive(Clone, Copy, Debug)]
-pub struct GgxEval {
-    /// BSDF times |cos| of `wi`, Fresnel factor left out.
-    pub f_cos: f32,
-    /// Solid-angle density of `ggx_sample_half` followed by reflection or refraction.
-    pub pdf: f32,
-    /// Cosine between `wo` and the half vector.
-    pub cos_half: f32,
 }
 
 const NOTHING: GgxEval = GgxEval {

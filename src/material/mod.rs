@@ -4,19 +4,23 @@
 //! Each file has a WGSL twin of the same name in `shaders/`.
 
 pub(crate) mod bsdf;
-mod fresnel;
+pub(crate) mod fresnel;
 pub(crate) mod ggx;
+pub(crate) mod interface;
 pub(crate) mod lobes;
 mod normal;
+pub(crate) mod scatter;
 pub(crate) mod surface;
 #[cfg(test)]
 mod tests;
 pub(crate) mod texture;
 
 pub use bsdf::{
-    BsdfEval, BsdfSample, bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_is_delta,
-    bsdf_is_lambertian, bsdf_passes_straight, bsdf_sample,
+    bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian,
+    bsdf_is_polished, bsdf_passes_straight, bsdf_sample,
 };
-pub use lobes::{is_smooth, transmits_unblurred};
+pub use interface::{DELTA_ALPHA, transmits_unblurred};
+pub use lobes::POLISHED_ALPHA;
+pub use scatter::{BsdfEval, BsdfSample};
 pub use surface::{Surface, surface_alpha, surface_at, triangle_emission};
 pub use texture::{srgb_decode, texture_sample};

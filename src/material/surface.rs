@@ -26,48 +26,48 @@ shared! {
     const SLIMMEST: f32 = 1e-4;
     /// Relative difference up to which a depth in `photo_albedo` is the point's own.
     const PHOTO_DEPTH_TOLERANCE: f32 = 0.02;
-}
 
-/// What the scattering functions need to know about a point.
-#[derive(Clone, Copy, Debug)]
-pub struct Surface {
-    /// Anchor-relative, metres.
-    pub position: Vec3,
-    /// Bound on the distance of `position` from the exact point of the triangle, and on that at which a ray from there may meet the triangle
-    /// again, metres.
-    pub error: f32,
-    /// Unit geometric normal on the side that the ray came from.
-    pub ng: Vec3,
-    /// Unit shading normal, on the same side as `ng`. Surfaces that mirror or refract have it turned so far that mirror directions
-    /// leave the surface; that of Lambertian ones may face away from the ray, which changes nothing for them.
-    pub ns: Vec3,
-    /// Shading normal of the clearcoat.
-    pub coat_ns: Vec3,
-    /// Linear, 0..1.
-    pub base_color: Vec3,
-    pub metallic: f32,
-    /// GGX alpha, the square of glTF's roughness.
-    pub ggx_alpha: f32,
-    pub ior: f32,
-    pub specular: f32,
-    pub specular_color: Vec3,
-    pub transmission: f32,
-    /// 0 where a ray leaves a volume: the coat lies outside.
-    pub clearcoat: f32,
-    pub coat_alpha: f32,
-    /// Radiance that leaves towards the ray.
-    pub emission: Vec3,
-    /// Opacity in 0..1: the probability that the surface is met at all.
-    pub coverage: f32,
-    /// The ray came from the side on which the vertices run counter-clockwise.
-    pub front: bool,
-    /// `packed::MATERIAL_*`; MATERIAL_PHOTO_ALBEDO surfaces are always MATERIAL_LAMBERTIAN.
-    pub flags: u32,
-    pub material: u32,
-    /// Index into the lights, or NONE.
-    pub light: u32,
-    /// Scene object, or NONE for quad lights.
-    pub object: u32,
+    /// What the scattering functions need to know about a point.
+    #[derive(Clone, Copy, Debug)]
+    pub value struct Surface {
+        /// Anchor-relative, metres.
+        pub position: Vec3,
+        /// Bound on the distance of `position` from the exact point of the triangle, and on that at which a ray from there may meet the triangle
+        /// again, metres.
+        pub error: f32,
+        /// Unit geometric normal on the side that the ray came from.
+        pub ng: Vec3,
+        /// Unit shading normal, on the same side as `ng`. Surfaces that mirror or refract have it turned so far that mirror directions
+        /// leave the surface; that of Lambertian ones may face away from the ray, which changes nothing for them.
+        pub ns: Vec3,
+        /// Shading normal of the clearcoat.
+        pub coat_ns: Vec3,
+        /// Linear, 0..1.
+        pub base_color: Vec3,
+        pub metallic: f32,
+        /// GGX alpha, the square of glTF's roughness.
+        pub ggx_alpha: f32,
+        pub ior: f32,
+        pub specular: f32,
+        pub specular_color: Vec3,
+        pub transmission: f32,
+        /// 0 where a ray leaves a volume: the coat lies outside.
+        pub clearcoat: f32,
+        pub coat_alpha: f32,
+        /// Radiance that leaves towards the ray.
+        pub emission: Vec3,
+        /// Opacity in 0..1: the probability that the surface is met at all.
+        pub coverage: f32,
+        /// The ray came from the side on which the vertices run counter-clockwise.
+        pub front: bool,
+        /// `packed::MATERIAL_*`; MATERIAL_PHOTO_ALBEDO surfaces are always MATERIAL_LAMBERTIAN.
+        pub flags: u32,
+        pub material: u32,
+        /// Index into the lights, or NONE.
+        pub light: u32,
+        /// Scene object, or NONE for quad lights.
+        pub object: u32,
+    }
 }
 
 /// Barycentric interpolation in the order that both backends use.

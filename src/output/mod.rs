@@ -3,6 +3,7 @@
 mod exr_file;
 mod exr_header;
 mod film_file;
+mod film_note;
 mod plain;
 mod png_file;
 mod reference_file;
@@ -11,7 +12,8 @@ mod temporary;
 
 pub use crate::decode::ChannelFile;
 pub use exr_file::{Metadata, write_exr};
-pub use film_file::{FilmNote, read_film, write_film};
+pub use film_file::{read_film, write_film};
+pub use film_note::FilmNote;
 pub use plain::{write_composite, write_image};
 pub(crate) use png_file::{PNG_END, picture_codes8};
 pub use png_file::{PngBits, write_png};

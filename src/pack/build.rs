@@ -7,21 +7,25 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::camera::frame_camera;
 use super::lights::pack_lights;
 use super::photons::TracedEnvironment;
-use crate::accel::{AccelError, WorldBvh};
+use crate::accel::{AccelError, Cover, WorldBvh};
 use crate::light::environment_table::environment_table;
 use crate::packed::materials::{MaterialKey, MaterialTable};
 use crate::packed::{
     ESTIMATOR_DIRECT, ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER,
     FRAME_SHUTTER_ORDERED, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE,
-    PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, SAMPLER_CMJ, SAMPLER_JITTERED,
+    PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, Resting, SAMPLER_CMJ, SAMPLER_JITTERED,
     SAMPLER_SOBOL, Triangle, Vertex,
 };
 use crate::scene::{
     EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind, Scene, Side,
 };
+use crate::work::{Meter, Phase, Watcher};
 
 /// The anchor is kept while the camera stays within this distance of it: f32 resolves 1 m to 1e-7 m.
 const ANCHOR_REACH_M: f64 = 1.0;
+
+/// What a triangle of a tree takes, where packing it is one step.
+const STEPS_OF_A_TREE: u64 = 4;
 
 #[derive(Debug, thiserror::Error)]
 pub enum PackError {
@@ -43,45 +47,41 @@ impl PackedScene {
     ///
     /// # Errors
     /// More triangles or texels than 32-bit indices address, or an acceleration structure cannot be built.
-    pub fn build(scene: &Scene) -> Result<Self, PackError> {
-        Self::build_at(scene, scene.camera.world_from_camera.w_axis.truncate())
+    pub fn build(scene: &Scene, watcher: &Watcher<'_>) -> Result<Self, PackError> {
+        Self::build_at(
+            scene,
+            scene.camera.world_from_camera.w_axis.truncate(),
+            watcher,
+        )
     }
 
     /// [`PackedScene::build`] anchored at a point of the world, which should be near the camera.
     ///
     /// # Errors
     /// As [`PackedScene::build`].
-    pub fn build_at(scene: &Scene, anchor: DVec3) -> Result<Self, PackError> {
+    pub fn build_at(
+        scene: &Scene,
+        anchor: DVec3,
+        watcher: &Watcher<'_>,
+    ) -> Result<Self, PackError> {
+        let [in_real, in_virtual] = [Side::Real, Side::Virtual].map(|side| triangles(scene, side));
+        let steps = (1 + STEPS_OF_A_TREE) * (in_real + in_virtual);
+        let meter = Meter::begin(watcher, Phase::Trees, steps);
         let mut packed = Self {
-            frame: bytemuck::Zeroable::zeroed(),
             anchor_m: anchor.to_array(),
-            real_bvh: WorldBvh::build(&[], 0)?,
-            virtual_bvh: WorldBvh::build(&[], 0)?,
-            triangles: Vec::new(),
-            vertices: Vec::new(),
-            materials: Vec::new(),
-            texture_refs: Vec::new(),
-            texels: Vec::new(),
-            lights: Vec::new(),
-            env_texels: Vec::new(),
-            env_cdf: Vec::new(),
-            photo_albedo: Vec::new(),
-            pixels: Vec::new(),
-            swept_spheres: Vec::new(),
-            material_table: MaterialTable::default(),
-            real_vertex_count: 0,
-            env_mean_luminance: 0.0,
-            env_traced: TracedEnvironment::default(),
-            photons_per_ray: 0,
+            ..Self::empty()
         };
         packed.set_camera(scene);
         packed.set_settings(scene);
         packed.set_environment(scene);
         packed.add_world(scene, Side::Real)?;
+        meter.add(in_real);
         packed.real_bvh = WorldBvh::build(&packed.corners(0), 0)?;
         packed.frame.real_triangle_count = packed.triangles.len() as u32;
         packed.real_vertex_count = packed.vertices.len();
+        meter.add(STEPS_OF_A_TREE * in_real);
         packed.rebuild_virtual(scene)?;
+        meter.end();
         Ok(packed)
     }
 
@@ -94,11 +94,25 @@ impl PackedScene {
         self.triangles.truncate(first as usize);
         self.vertices.truncate(self.real_vertex_count);
         self.add_world(scene, Side::Virtual)?;
-        self.virtual_bvh = WorldBvh::build(&self.corners(first as usize), first)?;
-        let spheres = self.virtual_bvh.bounding_spheres(MAX_SPHERES);
-        self.frame.sphere_count = spheres.len() as u32;
-        self.frame.spheres = [[0.0; 4]; MAX_SPHERES];
-        self.frame.spheres[..spheres.len()].copy_from_slice(&spheres);
+        self.resting = Resting {
+            triangles: self.triangles.len(),
+            vertices: self.vertices.len(),
+        };
+        let corners = self.corners(first as usize);
+        self.resting_cover = Cover::of(&corners, MAX_SPHERES);
+        self.resting_smooth_cover = self.cover_smooth(first as usize..self.triangles.len());
+        self.virtual_bvh = WorldBvh::build(&corners, first)?;
+        self.rebuild_moving(scene)
+    }
+
+    /// Packs what moves of the virtual objects, and all lights, anew: the cost is that of the moving triangles, and of a look at every vertex.
+    ///
+    /// # Errors
+    /// As [`PackedScene::build`].
+    pub fn rebuild_moving(&mut self, scene: &Scene) -> Result<(), PackError> {
+        self.place_moving(scene)?;
+        let corners = self.corners(self.resting.triangles);
+        self.virtual_bvh.set_moving(&corners)?;
         let alpha = self
             .materials
             .iter()
@@ -106,6 +120,22 @@ impl PackedScene {
         self.frame.flags = self.frame.flags & !FRAME_ALPHA | if alpha { FRAME_ALPHA } else { 0 };
         pack_lights(self, scene);
         self.pack_photons();
+        Ok(())
+    }
+
+    /// Puts what moves where it is, and the spheres about it; its tree and the lights stay as they were.
+    ///
+    /// # Errors
+    /// As [`PackedScene::build`].
+    pub(super) fn place_moving(&mut self, scene: &Scene) -> Result<(), PackError> {
+        self.triangles.truncate(self.resting.triangles);
+        self.vertices.truncate(self.resting.vertices);
+        self.add_objects(scene, Side::Virtual, true)?;
+        let cover = Cover::of(&self.corners(self.resting.triangles), MAX_SPHERES);
+        let spheres = Cover::spheres(&[&self.resting_cover, &cover], MAX_SPHERES);
+        self.frame.sphere_count = spheres.len() as u32;
+        self.frame.spheres = [[0.0; 4]; MAX_SPHERES];
+        self.frame.spheres[..spheres.len()].copy_from_slice(&spheres);
         Ok(())
     }
 
@@ -192,23 +222,9 @@ impl PackedScene {
         }
     }
 
-    /// Appends the triangles of one side: its objects, then its quad lights.
+    /// Appends the triangles of one side that rest: its objects, then its quad lights.
     fn add_world(&mut self, scene: &Scene, side: Side) -> Result<(), PackError> {
-        for (index, object) in scene
-            .objects
-            .iter()
-            .enumerate()
-            .filter(|(_, o)| o.side == side)
-        {
-            for instance in &object.instances {
-                let material = self.add_material(
-                    &instance.material,
-                    object.self_shadow_bias_m,
-                    object.albedo_from_photo,
-                )?;
-                self.add_instance(&object.world_from_object, instance, material, index as u32);
-            }
-        }
+        self.add_objects(scene, side, false)?;
         for (index, light) in scene.lights.iter().enumerate() {
             if light.side != side {
                 continue;
@@ -236,6 +252,27 @@ impl PackedScene {
                 );
             }
         }
+        self.check_triangles()
+    }
+
+    /// Appends the parts of one side's objects that move, or those that rest.
+    fn add_objects(&mut self, scene: &Scene, side: Side, moving: bool) -> Result<(), PackError> {
+        let objects = (scene.objects.iter().enumerate()).filter(|(_, o)| o.side == side);
+        for (index, object) in objects {
+            let parts = object.instances.iter();
+            for instance in parts.filter(|instance| object.moves(instance) == moving) {
+                let material = self.add_material(
+                    &instance.material,
+                    object.self_shadow_bias_m,
+                    object.albedo_from_photo,
+                )?;
+                self.add_instance(&object.world_from_object, instance, material, index as u32);
+            }
+        }
+        self.check_triangles()
+    }
+
+    fn check_triangles(&self) -> Result<(), PackError> {
         let limit = (NONE / 8) as usize;
         if self.triangles.len() > limit {
             return Err(PackError::TooMany(self.triangles.len(), "triangles", limit));
@@ -355,6 +392,13 @@ impl PackedScene {
             .map(|t| t.vertices.map(|v| self.position(v)))
             .collect()
     }
+}
+
+/// How many the objects of one side have.
+fn triangles(scene: &Scene, side: Side) -> u64 {
+    let objects = scene.objects.iter().filter(|object| object.side == side);
+    let instances = objects.flat_map(|object| &object.instances);
+    instances.map(|i| i.primitive.triangles.len() as u64).sum()
 }
 
 fn set_rotation(frame: &mut Frame, rotation_deg: f64) {

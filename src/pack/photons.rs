@@ -2,13 +2,13 @@
 
 use glam::Vec3;
 
-use crate::accel::covering_spheres;
-use crate::material::{is_smooth, transmits_unblurred};
+use crate::accel::Cover;
+use crate::material::{DELTA_ALPHA, POLISHED_ALPHA, transmits_unblurred};
 use crate::math::luminance;
 use crate::packed::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, Light, MATERIAL_LAMBERTIAN,
-    MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, MAX_PHOTON_SPHERES, Material, NONE,
-    PackedScene, xyz,
+    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
+    MAX_PHOTON_SPHERES, Material, NONE, PackedScene, xyz,
 };
 
 /// Light of the environment brighter than so many times its mean is sent as photons: the sun, lamps and windows. The eye's paths find the rest
@@ -18,20 +18,26 @@ const TRACED_ABOVE_MEAN: f64 = 8.0;
 const EVEN_SHARE: f64 = 0.1;
 
 impl PackedScene {
+    /// Covers the smooth surfaces among the virtual triangles in `range`.
+    pub(super) fn cover_smooth(&self, range: std::ops::Range<usize>) -> Cover {
+        let smooth: Vec<bool> = (self.materials.iter())
+            .map(|material| is_smooth_somewhere(self, material))
+            .collect();
+        let corners: Vec<[Vec3; 3]> = self.triangles[range]
+            .iter()
+            .filter(|triangle| smooth[triangle.material as usize])
+            .map(|triangle| triangle.vertices.map(|v| self.position(v)))
+            .collect();
+        Cover::of(&corners, MAX_PHOTON_SPHERES)
+    }
+
     /// Fills the frame's spheres about smooth virtual surfaces and the lights' shares of the photons. Wants the lights packed.
     pub(super) fn pack_photons(&mut self) {
         self.frame.photon_sphere_count = 0;
         self.frame.photon_spheres = [[0.0; 4]; MAX_PHOTON_SPHERES];
         self.frame.env_traced_above = f32::INFINITY;
-        let smooth: Vec<bool> = (self.materials.iter())
-            .map(|material| is_smooth_somewhere(self, material))
-            .collect();
-        let corners: Vec<[Vec3; 3]> = self.triangles[self.frame.real_triangle_count as usize..]
-            .iter()
-            .filter(|triangle| smooth[triangle.material as usize])
-            .map(|triangle| triangle.vertices.map(|v| self.position(v)))
-            .collect();
-        let spheres = covering_spheres(&corners, MAX_PHOTON_SPHERES);
+        let moving = self.cover_smooth(self.resting.triangles..self.triangles.len());
+        let spheres = Cover::spheres(&[&self.resting_smooth_cover, &moving], MAX_PHOTON_SPHERES);
         self.frame.photon_spheres[..spheres.len()].copy_from_slice(&spheres);
         let powers: Vec<f64> = (self.lights.iter())
             .map(|light| self.power_towards(light, &spheres))
@@ -93,7 +99,7 @@ impl PackedScene {
     }
 }
 
-/// Whether the surface has somewhere a lobe that mirrors or bends light without blurring it.
+/// Whether the surface has somewhere a lobe that mirrors or bends light without blurring it, or is polished.
 fn is_smooth_somewhere(packed: &PackedScene, material: &Material) -> bool {
     if material.flags & (MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT | MATERIAL_LAMBERTIAN) != 0 {
         return false;
@@ -102,13 +108,19 @@ fn is_smooth_somewhere(packed: &PackedScene, material: &Material) -> bool {
     let coat =
         material.clearcoat_roughness * least_green(packed, material.clearcoat_roughness_texture);
     let alpha = roughness * roughness;
-    let mirrors = is_smooth(alpha)
+    let is_textured = material.flags & MATERIAL_TEXTURED != 0;
+    let pure = material.metallic == 1.0
+        || material.transmission == 1.0
+        || material.base_color[..3] == [0.0; 3]
+        || (is_textured && material.metallic.max(material.transmission) > 0.0);
+    let is_polished = pure && alpha < POLISHED_ALPHA;
+    let mirrors = alpha < DELTA_ALPHA
         && (material.metallic > 0.0 || material.specular > 0.0 || material.transmission > 0.0);
     let bends = material.transmission > 0.0
         && material.flags & MATERIAL_THIN_WALLED == 0
         && material.ior != 1.0
         && transmits_unblurred(alpha, material.ior);
-    mirrors || bends || (material.clearcoat > 0.0 && is_smooth(coat * coat))
+    is_polished || mirrors || bends || (material.clearcoat > 0.0 && coat * coat < DELTA_ALPHA)
 }
 
 /// Least value of a texture's second channel, in 0..1; 1 where there is none.

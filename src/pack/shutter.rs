@@ -6,6 +6,7 @@ use super::build::PackError;
 use crate::packed::{FRAME_SHUTTER, FRAME_SHUTTER_ORDERED, Frame, PackedScene, SHUTTER_POSES};
 use crate::scene::projection::project;
 use crate::scene::{MotionBlurMethod, SamplerKind, Scene, Shutter};
+use crate::work::{Meter, Phase, Watcher};
 
 /// Where objects move, they stand still from one of these to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,23 +53,34 @@ impl PackedScene {
         }
     }
 
-    /// Finds what moving objects sweep over while the shutter is open, for the pilot. The virtual world is left at the picture's time.
+    /// Finds what moving objects sweep over while the shutter is open, for the pilot. No tree is built for it; the virtual world is left at the picture's time.
     ///
     /// # Errors
     /// As [`PackedScene::build`].
-    pub fn sweep(&mut self, scene: &mut Scene, instants: &[Instant]) -> Result<(), PackError> {
+    pub fn sweep(
+        &mut self,
+        scene: &mut Scene,
+        instants: &[Instant],
+        watcher: &Watcher<'_>,
+    ) -> Result<(), PackError> {
         self.swept_spheres.clear();
+        if instants.is_empty() {
+            return Ok(());
+        }
+        let meter = Meter::begin(watcher, Phase::Trees, instants.len() as u64);
         for instant in instants {
             scene.set_time(instant.time_secs);
-            self.rebuild_virtual(scene)?;
+            self.place_moving(scene)?;
             let count = self.frame.sphere_count as usize;
             self.swept_spheres
                 .extend_from_slice(&self.frame.spheres[..count]);
+            meter.add(1);
         }
-        if let Some(shutter) = scene.shutter.filter(|_| !instants.is_empty()) {
+        if let Some(shutter) = scene.shutter {
             scene.set_time(shutter.time_secs);
-            self.rebuild_virtual(scene)?;
+            self.rebuild_moving(scene)?;
         }
+        meter.end();
         Ok(())
     }
 }

@@ -1,15 +1,16 @@
 //! Packing against what the scene says, in f64.
 
+use crate::work::Watcher;
 use std::sync::Arc;
 
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DMat4, DQuat, DVec3, Vec3};
 
 use super::*;
-use crate::accel::Ray;
+use crate::accel::{Ray, WorldBvh};
 use crate::packed::*;
 use crate::scene::{
     AlphaMode, Environment, EnvironmentMap, Light as SceneLight, LightKind,
-    Material as SceneMaterial, Scene, Side,
+    Material as SceneMaterial, MotionKey, ObjectMotion, Scene, Side,
 };
 
 const TETRAHEDRON: [[f32; 3]; 4] = [
@@ -41,7 +42,7 @@ fn quad(side: Side, x: f64) -> SceneLight {
 }
 
 fn pack(scene: &Scene) -> PackedScene {
-    PackedScene::build(scene).expect("packs")
+    PackedScene::build(scene, &Watcher::none()).expect("packs")
 }
 
 fn two_objects(offset: DVec3) -> Scene {
@@ -306,4 +307,59 @@ fn rectangles_and_points_suffice_and_nothing_else_does() {
             scale: 1.0,
         });
     }));
+}
+
+/// A tetrahedron that goes from one place to another within a second.
+fn moving_tetrahedron() -> crate::scene::Object {
+    let mut object = tetrahedron(Side::Virtual, DVec3::new(0.0, 0.0, -2.0), DVec3::ONE);
+    let key = |time_secs, x| MotionKey {
+        time_secs,
+        translation: DVec3::new(x, 0.0, 0.0),
+        rotation: DQuat::IDENTITY,
+        scale: DVec3::ONE,
+    };
+    object.motion = Some(ObjectMotion::new(
+        object.world_from_object,
+        vec![key(0.0, 0.0), key(1.0, 5.0)],
+    ));
+    object
+}
+
+#[test]
+fn what_moves_is_packed_anew_as_if_all_were_and_what_rests_stays() {
+    let mut scene = two_objects(DVec3::ZERO);
+    scene.objects.insert(0, moving_tetrahedron());
+    scene.lights = vec![quad(Side::Virtual, 0.0)];
+    scene.set_time(0.0);
+    let mut packed = pack(&scene);
+    assert_eq!(packed.resting.triangles, 4 + 4 + 2);
+    assert_eq!(packed.triangles[10].object, 0);
+    let resting_of = |world: &WorldBvh| world.gpu_nodes()[1].as_ptr();
+    let resting = |packed: &PackedScene| resting_of(&packed.virtual_bvh);
+    let kept = resting(&packed);
+    let before = packed.frame.spheres;
+    for time_secs in [0.25, 1.0, 0.5] {
+        scene.set_time(time_secs);
+        packed.rebuild_moving(&scene).expect("packs");
+        let fresh = pack(&scene);
+        assert_eq!(packed.vertices, fresh.vertices);
+        assert_eq!(packed.triangles, fresh.triangles);
+        assert_eq!(packed.lights, fresh.lights);
+        assert_eq!(packed.frame.spheres, fresh.frame.spheres);
+        assert_eq!(
+            packed.virtual_bvh.gpu_nodes(),
+            fresh.virtual_bvh.gpu_nodes()
+        );
+        assert_eq!(
+            packed.virtual_bvh.gpu_leaves(),
+            fresh.virtual_bvh.gpu_leaves()
+        );
+        assert_eq!(resting(&packed), kept);
+    }
+    assert_ne!(packed.frame.spheres, before, "it moves");
+    // Kept, so that its place is not taken.
+    let empty = WorldBvh::build(&[], 0).expect("builds");
+    let old = std::mem::replace(&mut packed.virtual_bvh, empty);
+    packed.rebuild_virtual(&scene).expect("packs");
+    assert_ne!(resting(&packed), resting_of(&old), "control");
 }

@@ -3,13 +3,53 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use bytemuck::{Pod, Zeroable};
+
 use super::{
     MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
-    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, Material, NONE,
+    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE,
     PackedScene, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1, TEXTURE_WRAP_U_SHIFT,
     TEXTURE_WRAP_V_SHIFT, TextureRef, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT,
 };
 use crate::scene::{self, AlphaMode, Texture, Wrap};
+use crate::shared::shared;
+
+shared! {
+    /// A surface's material; factors as in [`scene::Material`].
+    #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+    pub struct Material {
+        pub base_color: [f32; 4],
+        pub emissive: [f32; 3],
+        pub normal_scale: f32,
+        pub metallic: f32,
+        pub roughness: f32,
+        pub ior: f32,
+        pub specular: f32,
+        pub specular_color: [f32; 3],
+        pub transmission: f32,
+        /// Absorption coefficient inside the volume, 1/m a channel.
+        pub sigma_a: [f32; 3],
+        pub clearcoat: f32,
+        pub clearcoat_roughness: f32,
+        pub clearcoat_normal_scale: f32,
+        pub alpha_cutoff: f32,
+        /// Metres; see `scene::Object::self_shadow_bias_m`.
+        pub self_shadow_bias: f32,
+        pub flags: u32,
+        /// Indices into `texture_refs`, or NONE.
+        pub base_color_texture: u32,
+        pub metallic_roughness_texture: u32,
+        pub normal_texture: u32,
+        pub emissive_texture: u32,
+        pub specular_texture: u32,
+        pub specular_color_texture: u32,
+        pub transmission_texture: u32,
+        pub clearcoat_texture: u32,
+        pub clearcoat_roughness_texture: u32,
+        pub clearcoat_normal_texture: u32,
+        pub pad: u32,
+    }
+}
 
 /// What makes two uses of a material the same packed record.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -64,7 +104,7 @@ impl MaterialTable {
             Some(texture) => self.texture(packed, texture, srgb),
             None => NONE,
         };
-        let mut record = Material {
+        Material {
             base_color: m.base_color,
             // Unlit surfaces show their base colour alone, and as lights would be sampled for what they do not show.
             emissive: if m.unlit { [0.0; 3] } else { m.emissive },
@@ -84,7 +124,7 @@ impl MaterialTable {
                 AlphaMode::Opaque | AlphaMode::Blend => 0.0,
             },
             self_shadow_bias: f32::from_bits(key.self_shadow_bias_bits),
-            flags: 0,
+            flags: flags(m, key.from_photo),
             base_color_texture: slot(&m.base_color_texture, true),
             metallic_roughness_texture: slot(&m.metallic_roughness_texture, false),
             normal_texture: slot(&m.normal_texture, false),
@@ -96,9 +136,7 @@ impl MaterialTable {
             clearcoat_roughness_texture: slot(&m.clearcoat_roughness_texture, false),
             clearcoat_normal_texture: slot(&m.clearcoat_normal_texture, false),
             pad: 0,
-        };
-        record.flags = flags(m, &record, key.from_photo);
-        record
+        }
     }
 
     fn texture(&mut self, packed: &mut PackedScene, r: &scene::TextureRef, srgb: bool) -> u32 {
@@ -169,22 +207,10 @@ impl MaterialTable {
     }
 }
 
-fn flags(m: &scene::Material, record: &Material, from_photo: bool) -> u32 {
+fn flags(m: &scene::Material, from_photo: bool) -> u32 {
     let bit = |on: bool, bit: u32| if on { bit } else { 0 };
     let lambertian = from_photo
         || (m.specular == 0.0 && m.metallic == 0.0 && m.transmission == 0.0 && m.clearcoat == 0.0);
-    let textures = [
-        record.base_color_texture,
-        record.metallic_roughness_texture,
-        record.normal_texture,
-        record.emissive_texture,
-        record.specular_texture,
-        record.specular_color_texture,
-        record.transmission_texture,
-        record.clearcoat_texture,
-        record.clearcoat_roughness_texture,
-        record.clearcoat_normal_texture,
-    ];
     bit(lambertian, MATERIAL_LAMBERTIAN)
         | bit(
             matches!(m.alpha_mode, AlphaMode::Mask(_)),
@@ -194,7 +220,7 @@ fn flags(m: &scene::Material, record: &Material, from_photo: bool) -> u32 {
         | bit(m.unlit, MATERIAL_UNLIT)
         | bit(m.thin_walled, MATERIAL_THIN_WALLED)
         | bit(from_photo, MATERIAL_PHOTO_ALBEDO)
-        | bit(textures.iter().any(|&t| t != NONE), MATERIAL_TEXTURED)
+        | bit(m.textures().next().is_some(), MATERIAL_TEXTURED)
 }
 
 /// KHR_materials_volume: white light becomes `color` after `distance_m`. A black channel absorbs within a thousandth of it.

@@ -1,14 +1,15 @@
 //! The scene as both backends read it: flat arrays of plain records, f32, positions relative to an anchor near the camera.
 //!
 //! The records are declared for both sides at once ([`records`], [`crate::shared`]).
-//! Triangle ids are global: real triangles come first (`0..Frame::real_triangle_count`), virtual ones after.
+//! Triangle ids are global: real triangles come first (`0..Frame::real_triangle_count`), then virtual ones that rest, then those that move.
 
 pub(crate) mod materials;
 pub(crate) mod records;
 
+pub use materials::Material;
 pub use records::*;
 
-use crate::accel::WorldBvh;
+use crate::accel::{Cover, WorldBvh};
 use crate::pack::TracedEnvironment;
 pub use crate::shared::NONE;
 
@@ -42,15 +43,26 @@ pub struct PackedScene {
     pub swept_spheres: Vec<[f32; 4]>,
     pub(crate) material_table: materials::MaterialTable,
     pub(crate) real_vertex_count: usize,
+    pub(crate) resting: Resting,
+    /// Over the virtual triangles that rest.
+    pub(crate) resting_cover: Cover,
+    /// Over those of them that are smooth.
+    pub(crate) resting_smooth_cover: Cover,
     pub(crate) env_mean_luminance: f64,
     pub(crate) env_traced: TracedEnvironment,
     /// Photons traced for every ray per pixel; 0 where none are.
     pub photons_per_ray: u64,
 }
 
-#[cfg(test)]
+/// How many of a scene's triangles and vertices rest: those of animated virtual objects come after them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Resting {
+    pub triangles: usize,
+    pub vertices: usize,
+}
+
 impl PackedScene {
-    /// No geometry, no light: what unit tests of the shading fill in by hand.
+    /// No geometry, no light, at the origin.
     pub(crate) fn empty() -> Self {
         let world = || WorldBvh::build(&[], 0).expect("an empty world is legal");
         Self {
@@ -71,6 +83,9 @@ impl PackedScene {
             swept_spheres: Vec::new(),
             material_table: materials::MaterialTable::default(),
             real_vertex_count: 0,
+            resting: Resting::default(),
+            resting_cover: Cover::of(&[], MAX_SPHERES),
+            resting_smooth_cover: Cover::of(&[], MAX_PHOTON_SPHERES),
             env_mean_luminance: 0.0,
             env_traced: TracedEnvironment::default(),
             photons_per_ray: 0,

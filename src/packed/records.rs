@@ -160,40 +160,6 @@ shared! {
     /// Some texture is referenced.
     pub const MATERIAL_TEXTURED: u32 = 128;
 
-    #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-    pub struct Material {
-        pub base_color: [f32; 4],
-        pub emissive: [f32; 3],
-        pub normal_scale: f32,
-        pub metallic: f32,
-        pub roughness: f32,
-        pub ior: f32,
-        pub specular: f32,
-        pub specular_color: [f32; 3],
-        pub transmission: f32,
-        /// Absorption coefficient inside the volume, 1/m a channel.
-        pub sigma_a: [f32; 3],
-        pub clearcoat: f32,
-        pub clearcoat_roughness: f32,
-        pub clearcoat_normal_scale: f32,
-        pub alpha_cutoff: f32,
-        /// Metres; see `scene::Object::self_shadow_bias_m`.
-        pub self_shadow_bias: f32,
-        pub flags: u32,
-        /// Indices into `texture_refs`, or NONE.
-        pub base_color_texture: u32,
-        pub metallic_roughness_texture: u32,
-        pub normal_texture: u32,
-        pub emissive_texture: u32,
-        pub specular_texture: u32,
-        pub specular_color_texture: u32,
-        pub transmission_texture: u32,
-        pub clearcoat_texture: u32,
-        pub clearcoat_roughness_texture: u32,
-        pub clearcoat_normal_texture: u32,
-        pub pad: u32,
-    }
-
     pub const TEXTURE_SRGB: u32 = 1;
     pub const TEXTURE_NEAREST: u32 = 2;
     pub const TEXTURE_UV1: u32 = 4;

@@ -32,19 +32,30 @@ pub(super) struct Core {
 impl Core {
     /// Packs the whole scene anew, anchored at its camera.
     pub fn pack(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
-        self.packed = packing(watcher, || PackedScene::build(&self.scene))?;
+        self.packed = PackedScene::build(&self.scene, watcher)?;
         Ok(())
     }
 
     /// The same, anchored at a point of the world.
     pub fn pack_at(&mut self, anchor: DVec3, watcher: &Watcher<'_>) -> Result<(), PackError> {
-        self.packed = packing(watcher, || PackedScene::build_at(&self.scene, anchor))?;
+        self.packed = PackedScene::build_at(&self.scene, anchor, watcher)?;
         Ok(())
     }
 
     /// Packs the virtual world anew.
     pub fn pack_virtual(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
-        packing(watcher, || self.packed.rebuild_virtual(&self.scene))
+        let meter = Meter::begin(watcher, Phase::Trees, 1);
+        self.packed.rebuild_virtual(&self.scene)?;
+        meter.end();
+        Ok(())
+    }
+
+    /// Packs anew what moves.
+    pub fn pack_moving(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
+        let meter = Meter::begin(watcher, Phase::Trees, 1);
+        self.packed.rebuild_moving(&self.scene)?;
+        meter.end();
+        Ok(())
     }
 
     /// Takes the samples of a list. A device that is lost is replaced by the CPU, which takes what is left.
@@ -142,17 +153,6 @@ impl Core {
         self.seconds.render += stopwatch.secs();
         self.seconds.cpu += stopwatch.cpu_secs();
     }
-}
-
-/// Tells the watcher that trees are built.
-pub(super) fn packing<T>(
-    watcher: &Watcher<'_>,
-    pack: impl FnOnce() -> Result<T, PackError>,
-) -> Result<T, PackError> {
-    let meter = Meter::begin(watcher, Phase::Trees, 1);
-    let packed = pack()?;
-    meter.end();
-    Ok(packed)
 }
 
 pub(super) fn is_within_reach(info: &PixelInfo) -> bool {

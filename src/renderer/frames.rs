@@ -31,7 +31,7 @@ pub struct FrameEdit {
 }
 
 impl Renderer {
-    /// Goes on to another frame of the same scene. The real world and its BVH stay, and the virtual ones unless objects have moved; the
+    /// Goes on to another frame of the same scene. What rests and its trees stay, and what moves unless it has moved; the
     /// film starts anew. An exposure that was fitted to the first photograph is kept.
     ///
     /// # Errors
@@ -86,8 +86,8 @@ impl Renderer {
         }
         core.packed.set_camera(&core.scene);
         if moved {
-            core.pack_virtual(watcher)?;
-            return self.restart(true, Changed::Virtual, watcher);
+            core.pack_moving(watcher)?;
+            return self.restart(true, Changed::Moving, watcher);
         }
         self.restart(true, Changed::View, watcher)
     }
@@ -98,13 +98,13 @@ impl Renderer {
             || self.core.packed.frame.flags & FRAME_SHUTTER != 0
     }
 
-    /// The shutter of the scene as it is now, and who drives it; true if the virtual world was packed anew.
-    pub(super) fn prepare_shutter(&mut self) -> Result<bool, RenderError> {
+    /// The shutter of the scene as it is now, and who drives it; true if what moves was packed anew.
+    pub(super) fn prepare_shutter(&mut self, watcher: &Watcher<'_>) -> Result<bool, RenderError> {
         let core = &mut self.core;
         let instants = instants(&core.scene);
         let objects_move = !instants.is_empty();
         let swept = objects_move || matches!(self.driver, Driver::Moving(_));
-        core.packed.sweep(&mut core.scene, &instants)?;
+        core.packed.sweep(&mut core.scene, &instants, watcher)?;
         core.packed.set_shutter(&core.scene, objects_move);
         self.driver = match objects_move {
             true => Driver::Moving(Moving { instants }),

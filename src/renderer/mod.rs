@@ -53,7 +53,7 @@ pub use stats::Stats;
 
 pub use crate::work::{Phase, Progress, RayCounts, Watcher};
 
-use self::core::{Core, packing};
+use self::core::Core;
 use backend::Backend;
 use moving::Moving;
 use stopwatch::Stopwatch;
@@ -176,7 +176,7 @@ impl Renderer {
             return Err(RenderError::SampleRange(first_sample, end_sample, total));
         }
         needs::ensure_scene(&scene, options.all_planes)?;
-        let packed = packing(watcher, || PackedScene::build(&scene))?;
+        let packed = PackedScene::build(&scene, watcher)?;
         needs::ensure_film(&packed, options.all_planes)?;
         let film = Film::new(
             packed.frame.width,
@@ -202,7 +202,7 @@ impl Renderer {
             surfaces: Vec::new(),
         };
         renderer.prepare_photo(watcher);
-        renderer.prepare_shutter()?;
+        renderer.prepare_shutter(watcher)?;
         renderer.look_ahead(watcher);
         let seconds = &mut renderer.core.seconds;
         seconds.build = stopwatch.secs() - seconds.look_ahead;
@@ -319,116 +319,4 @@ impl Renderer {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Mutex;
-
-    use super::*;
-    use crate::pack::{test_mesh, test_scene};
-    use crate::scene::{
-        BackendChoice, EncodedPhoto, Environment, EnvironmentMap, Light, LightKind, Material,
-        Photo, Side,
-    };
-
-    #[test]
-    fn no_device_is_opened_until_there_is_something_to_trace() {
-        let mut scene = test_scene();
-        scene.settings.backend = BackendChoice::Auto;
-        let mut renderer =
-            Renderer::new(scene, RendererOptions::default(), &Watcher::none()).expect("fits");
-        assert!(matches!(renderer.core.backend, Backend::Undecided));
-        (renderer.advance(Budget::Complete, &Watcher::none())).expect("nothing to do");
-        assert_eq!(renderer.rays(), RayCounts::default());
-        let lamp = Light {
-            kind: LightKind::Quad {
-                corner: [-1.0, -1.0, -2.0],
-                edge_u: [2.0, 0.0, 0.0],
-                edge_v: [0.0, 2.0, 0.0],
-                radiance: [1.0; 3],
-            },
-            side: Side::Virtual,
-        };
-        renderer
-            .set_lights(vec![lamp], &Watcher::none())
-            .expect("fits");
-        assert!(!matches!(renderer.core.backend, Backend::Undecided));
-    }
-
-    /// A floor and a smaller square above it, before a photograph.
-    fn scene_with_a_photo(albedo_from_photo: bool) -> Scene {
-        let square = |side, half: f32, depth: f32| {
-            let corners = [[-half, -half], [half, -half], [half, half], [-half, half]];
-            let corners = corners.map(|[x, y]| [x, y, -depth]);
-            let triangles = [[0, 1, 2], [0, 2, 3]];
-            test_mesh(side, &corners, &triangles, Material::default())
-        };
-        let mut scene = test_scene();
-        let mut floor = square(Side::Real, 2.0, 2.0);
-        floor.albedo_from_photo = albedo_from_photo;
-        scene.objects = vec![floor, square(Side::Virtual, 0.2, 1.0)];
-        scene.environment = Some(Environment {
-            map: EnvironmentMap::Constant([1.0; 3]),
-            rotation_deg: 0.0,
-            scale: 1.0,
-        });
-        scene.photo = Some(Photo {
-            width: 4,
-            height: 3,
-            linear: vec![[0.5; 3]; 12],
-            encoded: EncodedPhoto::Linear,
-        });
-        scene
-    }
-
-    fn heard_of(scene: Scene, goal: Option<&ErrorGoal>) -> Vec<Progress> {
-        let heard = Mutex::new(Vec::new());
-        let hear = |progress: &Progress| heard.lock().expect("whole").push(*progress);
-        let watcher = Watcher::none().heard_by(&hear);
-        let mut renderer =
-            Renderer::new(scene, RendererOptions::default(), &watcher).expect("fits");
-        match goal {
-            Some(goal) => renderer.render_to_error(goal, &watcher).expect("renders"),
-            None => (renderer.advance(Budget::Complete, &watcher)).expect("renders"),
-        }
-        heard.into_inner().expect("whole")
-    }
-
-    #[test]
-    fn a_watcher_hears_every_phase_from_its_beginning_to_its_end() {
-        let goal = ErrorGoal {
-            standard_error: Some(0.01),
-            noise: None,
-            max_rays_per_pixel: 64,
-        };
-        let phases = |heard: &[Progress]| {
-            let mut phases: Vec<Phase> = heard.iter().map(|progress| progress.phase).collect();
-            phases.dedup();
-            phases
-        };
-        let with_albedo = [
-            Phase::Trees,
-            Phase::Albedo,
-            Phase::LookingAhead,
-            Phase::Rendering,
-        ];
-        for goal in [None, Some(&goal)] {
-            let heard = heard_of(scene_with_a_photo(true), goal);
-            assert_eq!(phases(&heard), with_albedo);
-            for of_phase in heard.chunk_by(|a, b| a.phase == b.phase) {
-                let shares: Vec<f64> = of_phase.iter().map(|p| p.share_done).collect();
-                assert_eq!((shares[0], shares.last()), (0.0, Some(&1.0)), "{shares:?}");
-                // Tiles above the goal make what is expected grow.
-                assert!(goal.is_some() || shares.is_sorted(), "{shares:?}");
-            }
-            let last = heard.last().expect("something was heard");
-            assert_eq!(last.samples, last.samples_total);
-            assert!(last.rays.primary > 0);
-            assert!(goal.is_some() || last.samples == 4);
-        }
-        let without = heard_of(scene_with_a_photo(false), None);
-        assert_ne!(
-            phases(&without),
-            with_albedo,
-            "control: no albedo is estimated"
-        );
-    }
-}
+mod tests;

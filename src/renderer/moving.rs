@@ -1,6 +1,6 @@
 //! The driver of a scene whose objects move while the shutter is open.
 //!
-//! Moving objects stand still from one instant to the next: the virtual world is packed anew for each, and every row takes at an instant the
+//! Moving objects stand still from one instant to the next: what moves is packed anew for each, and every row takes at an instant the
 //! samples that fall into it, so that a pixel's samples follow one another in time. (A moving camera is part of each camera ray.)
 
 use super::RenderError;
@@ -84,10 +84,10 @@ fn ends_of(core: &Core, instant: &Instant) -> Vec<u32> {
     row_ends(&core.scene, instant, core.scene.settings.rays_per_pixel)
 }
 
-/// Moves the virtual world to where it is at an instant.
+/// Moves the objects to where they are at an instant.
 fn stand_at(core: &mut Core, instant: &Instant) -> Result<(), RenderError> {
     core.scene.set_time(instant.time_secs);
-    core.packed.rebuild_virtual(&core.scene)?;
-    core.backend.update(&core.packed, Changed::Virtual)?;
+    core.packed.rebuild_moving(&core.scene)?;
+    core.backend.update(&core.packed, Changed::Moving)?;
     Ok(())
 }

@@ -23,11 +23,11 @@ impl Renderer {
         if real_light_changed {
             self.prepare_photo(watcher);
         }
-        let swept = self.prepare_shutter()?;
+        let swept = self.prepare_shutter(watcher)?;
         self.look_ahead(watcher);
         let core = &mut self.core;
         let changed = match changed {
-            Changed::View if swept => Changed::Virtual,
+            Changed::View if swept => Changed::Moving,
             changed => changed,
         };
         core.backend.update(&core.packed, changed)?;
@@ -89,12 +89,16 @@ impl Renderer {
     /// Runs the pilot and begins the film that follows its plan.
     pub(super) fn look_ahead(&mut self, watcher: &Watcher<'_>) {
         let stopwatch = Stopwatch::start();
-        let meter = Meter::begin(watcher, Phase::LookingAhead, 1);
+        let meter = Meter::begin(
+            watcher,
+            Phase::LookingAhead,
+            cpu::pilot_steps(&self.core.packed.frame),
+        );
         self.stated = None;
         let core = &mut self.core;
         let without = core.options.without;
         without.apply_to_frame(&mut core.packed.frame);
-        cpu::pilot(&mut core.packed);
+        cpu::pilot(&mut core.packed, &meter);
         without.apply_to_pixels(&mut core.packed.pixels);
         core.film = Film::new(
             core.film.width,

@@ -1,6 +1,7 @@
 //! `[camera]` and `[lens]`.
 
 use crate::decode::{MAX_PIXELS, MAX_SIDE_PX};
+use crate::refusal::Refusal;
 
 use super::error::Result;
 use super::pose::read_camera_pose;
@@ -47,7 +48,7 @@ pub(super) fn read_camera(
             .or(given.size);
         let pose = table.as_ref().map(read_camera_pose).transpose()?;
         return size
-            .ok_or_else(|| "the intrinsics tell no size".to_owned())
+            .ok_or_else(|| Refusal::from("the intrinsics tell no size"))
             .and_then(|size| given.camera(size, pose.unwrap_or_default()))
             .map_err(|problem| {
                 root.error(

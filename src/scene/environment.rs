@@ -51,14 +51,14 @@ fn largest(texels: &[[f32; 3]]) -> f32 {
 
 fn read_lat_long(node: &Node, warnings: &mut Vec<String>) -> Result<EnvironmentMap> {
     let path = node.existing_file()?;
-    let image = read_image(&path).map_err(|problem| node.file_error(&path, &problem))?;
+    let image = read_image(&path).map_err(|problem| node.file_error(&path, problem))?;
     let (width, height) = (image.width, image.height);
     let mut notes = image.warnings;
     if width < 2 || height < 2 {
         let problem = format!(
             "it has {width} x {height} pixels; expected at least 2 x 2; use `radiance` for a constant"
         );
-        return Err(node.file_error(&path, &problem));
+        return Err(node.file_error(&path, problem));
     }
     if width != height * 2 {
         notes.push(format!(

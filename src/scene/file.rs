@@ -64,7 +64,7 @@ pub fn load_with(path: &Path, given: Given) -> std::result::Result<Scene, SceneE
         reason,
     })?;
     let mut source = Source::new(path, bytes)?;
-    source.sandbox = given.sandbox.then(|| Sandbox::of_scene(path));
+    source.sandbox = given.sandbox.then(|| Sandbox::around(path));
     read_scene(&source, given)
 }
 

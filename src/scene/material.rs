@@ -1,8 +1,117 @@
-//! `material = { ... }` of an object: replaces what its mesh brought.
+//! A material, and `material = { ... }` of an object, which replaces what its mesh brought.
 
 use super::error::Result;
+use super::fingerprint::content;
 use super::reader::{Node, is_not_negative, is_unit};
-use super::{AlphaMode, Material};
+use super::{AlphaMode, TextureRef};
+
+/// glTF metallic-roughness with the extensions mixray knows. Factors as in glTF; colours linear.
+#[derive(Clone, Debug)]
+pub struct Material {
+    pub name: String,
+    pub base_color: [f32; 4],
+    pub base_color_texture: Option<TextureRef>,
+    pub metallic: f32,
+    /// Perceptual roughness; GGX alpha is its square.
+    pub roughness: f32,
+    /// G roughness, B metallic.
+    pub metallic_roughness_texture: Option<TextureRef>,
+    pub normal_texture: Option<TextureRef>,
+    pub normal_scale: f32,
+    /// Radiance, emissive strength included.
+    pub emissive: [f32; 3],
+    pub emissive_texture: Option<TextureRef>,
+    pub alpha_mode: AlphaMode,
+    /// Emits its base colour and scatters nothing.
+    pub unlit: bool,
+    pub ior: f32,
+    pub specular: f32,
+    /// A channel.
+    pub specular_texture: Option<TextureRef>,
+    pub specular_color: [f32; 3],
+    /// RGB, sRGB encoded.
+    pub specular_color_texture: Option<TextureRef>,
+    pub transmission: f32,
+    /// R channel.
+    pub transmission_texture: Option<TextureRef>,
+    /// True: a sheet without inside (glTF thickness 0), light goes straight through; false: the mesh bounds a volume and refracts.
+    pub thin_walled: bool,
+    pub attenuation_color: [f32; 3],
+    /// Infinity: clear.
+    pub attenuation_distance_m: f32,
+    pub clearcoat: f32,
+    /// R channel.
+    pub clearcoat_texture: Option<TextureRef>,
+    pub clearcoat_roughness: f32,
+    /// G channel.
+    pub clearcoat_roughness_texture: Option<TextureRef>,
+    pub clearcoat_normal_texture: Option<TextureRef>,
+    pub clearcoat_normal_scale: f32,
+}
+
+impl Default for Material {
+    /// A white dielectric, fully rough: what a scene file's `material = {}` starts from.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color: [1.0; 4],
+            base_color_texture: None,
+            metallic: 0.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            emissive: [0.0; 3],
+            emissive_texture: None,
+            alpha_mode: AlphaMode::Opaque,
+            unlit: false,
+            ior: 1.5,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: [1.0; 3],
+            specular_color_texture: None,
+            transmission: 0.0,
+            transmission_texture: None,
+            thin_walled: false,
+            attenuation_color: [1.0; 3],
+            attenuation_distance_m: f32::INFINITY,
+            clearcoat: 0.0,
+            clearcoat_texture: None,
+            clearcoat_roughness: 0.0,
+            clearcoat_roughness_texture: None,
+            clearcoat_normal_texture: None,
+            clearcoat_normal_scale: 1.0,
+        }
+    }
+}
+
+impl Material {
+    /// All that it reads.
+    pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
+        [
+            &self.base_color_texture,
+            &self.metallic_roughness_texture,
+            &self.normal_texture,
+            &self.emissive_texture,
+            &self.specular_texture,
+            &self.specular_color_texture,
+            &self.transmission_texture,
+            &self.clearcoat_texture,
+            &self.clearcoat_roughness_texture,
+            &self.clearcoat_normal_texture,
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
+content! {
+    Material {
+        base_color, base_color_texture, metallic, roughness, metallic_roughness_texture, normal_texture, normal_scale, emissive,
+        emissive_texture, alpha_mode, unlit, ior, specular, specular_texture, specular_color, specular_color_texture, transmission,
+        transmission_texture, thin_walled, attenuation_color, attenuation_distance_m, clearcoat, clearcoat_texture, clearcoat_roughness,
+        clearcoat_roughness_texture, clearcoat_normal_texture, clearcoat_normal_scale; name }
+}
 
 const KEYS: &[&str] = &[
     "base_color",

@@ -8,7 +8,7 @@ mod camera;
 mod environment;
 pub(crate) mod error;
 mod file;
-mod fingerprint;
+pub(crate) mod fingerprint;
 pub mod gltf;
 mod light;
 mod material;
@@ -17,7 +17,7 @@ mod photo;
 mod pose;
 pub mod projection;
 pub(crate) mod reader;
-mod sandbox;
+pub(crate) mod sandbox;
 mod scan;
 mod settings;
 pub(crate) mod shape;
@@ -33,6 +33,7 @@ pub use crate::stages::settings::*;
 pub use error::SceneError;
 pub use file::{Given, load, load_with};
 pub use fingerprint::{Content, ContentHash};
+pub use material::Material;
 pub use photo::read_codes;
 pub use reader::Choice;
 pub use settings::Overrides;
@@ -235,86 +236,6 @@ pub struct Primitive {
     /// Linear, multiplies the base colour.
     pub colors: Vec<[f32; 4]>,
     pub triangles: Vec<[u32; 3]>,
-}
-
-/// glTF metallic-roughness with the extensions mixray knows. Factors as in glTF; colours linear.
-#[derive(Clone, Debug)]
-pub struct Material {
-    pub name: String,
-    pub base_color: [f32; 4],
-    pub base_color_texture: Option<TextureRef>,
-    pub metallic: f32,
-    /// Perceptual roughness; GGX alpha is its square.
-    pub roughness: f32,
-    /// G roughness, B metallic.
-    pub metallic_roughness_texture: Option<TextureRef>,
-    pub normal_texture: Option<TextureRef>,
-    pub normal_scale: f32,
-    /// Radiance, emissive strength included.
-    pub emissive: [f32; 3],
-    pub emissive_texture: Option<TextureRef>,
-    pub alpha_mode: AlphaMode,
-    /// Emits its base colour and scatters nothing.
-    pub unlit: bool,
-    pub ior: f32,
-    pub specular: f32,
-    /// A channel.
-    pub specular_texture: Option<TextureRef>,
-    pub specular_color: [f32; 3],
-    /// RGB, sRGB encoded.
-    pub specular_color_texture: Option<TextureRef>,
-    pub transmission: f32,
-    /// R channel.
-    pub transmission_texture: Option<TextureRef>,
-    /// True: a sheet without inside (glTF thickness 0), light goes straight through; false: the mesh bounds a volume and refracts.
-    pub thin_walled: bool,
-    pub attenuation_color: [f32; 3],
-    /// Infinity: clear.
-    pub attenuation_distance_m: f32,
-    pub clearcoat: f32,
-    /// R channel.
-    pub clearcoat_texture: Option<TextureRef>,
-    pub clearcoat_roughness: f32,
-    /// G channel.
-    pub clearcoat_roughness_texture: Option<TextureRef>,
-    pub clearcoat_normal_texture: Option<TextureRef>,
-    pub clearcoat_normal_scale: f32,
-}
-
-impl Default for Material {
-    /// A white dielectric, fully rough: what a scene file's `material = {}` starts from.
-    fn default() -> Self {
-        Self {
-            name: String::new(),
-            base_color: [1.0; 4],
-            base_color_texture: None,
-            metallic: 0.0,
-            roughness: 1.0,
-            metallic_roughness_texture: None,
-            normal_texture: None,
-            normal_scale: 1.0,
-            emissive: [0.0; 3],
-            emissive_texture: None,
-            alpha_mode: AlphaMode::Opaque,
-            unlit: false,
-            ior: 1.5,
-            specular: 1.0,
-            specular_texture: None,
-            specular_color: [1.0; 3],
-            specular_color_texture: None,
-            transmission: 0.0,
-            transmission_texture: None,
-            thin_walled: false,
-            attenuation_color: [1.0; 3],
-            attenuation_distance_m: f32::INFINITY,
-            clearcoat: 0.0,
-            clearcoat_texture: None,
-            clearcoat_roughness: 0.0,
-            clearcoat_roughness_texture: None,
-            clearcoat_normal_texture: None,
-            clearcoat_normal_scale: 1.0,
-        }
-    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

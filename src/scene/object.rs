@@ -128,7 +128,7 @@ impl<'w> ObjectReader<'w> {
             Some(mesh) => Rc::clone(mesh),
             None => {
                 let mesh = load_within(&path, key.1.as_deref(), node.sandbox())
-                    .map_err(|error| node.file_error(&path, &advise(&error.problem)))?;
+                    .map_err(|error| node.file_error(&path, advise(&error.problem)))?;
                 self.warnings
                     .extend(node.file_warnings(mesh.warnings.clone()));
                 let mesh = Rc::new(mesh);
@@ -206,7 +206,12 @@ impl<'w> ObjectReader<'w> {
 impl Object {
     /// It has a motion, or a part of it an animation.
     pub fn is_animated(&self) -> bool {
-        self.motion.is_some() || self.instances.iter().any(|i| i.animation.is_some())
+        self.instances.iter().any(|instance| self.moves(instance))
+    }
+
+    /// Whether one of its parts moves, with it or by itself.
+    pub fn moves(&self, instance: &Instance) -> bool {
+        self.motion.is_some() || instance.animation.is_some()
     }
 
     /// World-from-object at a time.

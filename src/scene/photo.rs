@@ -7,6 +7,7 @@ use super::reader::{Node, Table};
 use super::srgb::{decode8, decode16};
 use super::{EncodedPhoto, Exposure, Photo};
 use crate::decode::{ImageFile, Pixels, decode_image, read_image};
+use crate::refusal::Refusal;
 
 const KEYS: &[&str] = &["image", "exposure_ev"];
 
@@ -49,7 +50,7 @@ fn read_exposure(node: &Node, has_photo: bool) -> Result<Exposure> {
 
 fn read_photo_image(node: &Node, warnings: &mut Vec<String>) -> Result<Photo> {
     let path = node.existing_file()?;
-    let (photo, notes) = Photo::read(&path).map_err(|problem| node.file_error(&path, &problem))?;
+    let (photo, notes) = Photo::read(&path).map_err(|problem| node.file_error(&path, problem))?;
     warnings.extend(node.file_warnings(notes));
     Ok(photo)
 }
@@ -58,7 +59,7 @@ fn read_photo_image(node: &Node, warnings: &mut Vec<String>) -> Result<Photo> {
 ///
 /// # Errors
 /// Why the file cannot be used, in one line without its path.
-pub fn read_codes(path: &Path) -> std::result::Result<(u32, u32, EncodedPhoto), String> {
+pub fn read_codes(path: &Path) -> std::result::Result<(u32, u32, EncodedPhoto), Refusal> {
     let image = read_image(path)?;
     let codes = match image.pixels {
         Pixels::Srgb8(codes) => EncodedPhoto::Srgb8(codes),
@@ -73,7 +74,7 @@ impl Photo {
     ///
     /// # Errors
     /// Why the file cannot be used, in one line without its path.
-    pub fn read(path: &Path) -> std::result::Result<(Self, Vec<String>), String> {
+    pub fn read(path: &Path) -> std::result::Result<(Self, Vec<String>), Refusal> {
         Ok(Self::of(read_image(path)?))
     }
 
@@ -81,7 +82,7 @@ impl Photo {
     ///
     /// # Errors
     /// Why they cannot be used, in one line.
-    pub fn decode(bytes: &[u8]) -> std::result::Result<(Self, Vec<String>), String> {
+    pub fn decode(bytes: &[u8]) -> std::result::Result<(Self, Vec<String>), Refusal> {
         Ok(Self::of(decode_image(bytes)?))
     }
 

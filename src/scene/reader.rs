@@ -279,7 +279,7 @@ impl<'a> Node<'a> {
     }
 
     /// An error of a file that this string names; `problem` reads "problem; expected ...; how to mend".
-    pub fn file_error(&self, path: &Path, problem: &str) -> SceneError {
+    pub fn file_error(&self, path: &Path, problem: impl Display) -> SceneError {
         let message = format!("`{}` {}: {problem}", self.label, path.display());
         self.source.error(self.offset, message)
     }

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use crate::files::resolved;
 
-/// The folder of a scene file, links resolved.
+/// The folder of a scene file or a film, links resolved.
 #[derive(Clone, Debug)]
 pub(crate) struct Sandbox(PathBuf);
 
 impl Sandbox {
-    pub fn of_scene(path: &Path) -> Self {
+    pub fn around(path: &Path) -> Self {
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
         Self(resolved(path.parent().unwrap_or(&path)))
     }
@@ -40,7 +40,7 @@ mod tests {
         std::fs::write(at("out.png"), "").unwrap();
         std::fs::create_dir(at("scene-2")).unwrap();
         std::fs::write(at("scene-2/near.png"), "").unwrap();
-        let sandbox = Sandbox::of_scene(&at("scene/scene.toml"));
+        let sandbox = Sandbox::around(&at("scene/scene.toml"));
         let admits = |name: &str| sandbox.refusal(&at(name)).is_none();
         assert!(
             admits("scene/in.png") && admits("scene/sub/../in.png") && admits("scene/absent.png")

@@ -11,6 +11,7 @@ pub use super::noise::settings::{
 };
 
 use crate::scene::error::Result;
+use crate::scene::fingerprint::content;
 use crate::scene::reader::Table;
 use crate::stages::table::StageSettings;
 
@@ -21,6 +22,8 @@ macro_rules! stages {
         pub struct Stages {
             $($(#[$doc])* pub $name: Option<$settings>,)*
         }
+
+        content! { Stages { $($name),* } }
 
         impl Stages {
             /// Their tables in a scene file, which are their names.

@@ -5,7 +5,7 @@ use super::device::composer;
 use super::settings::Stages;
 use crate::gpu::Features;
 use crate::gpu::compose::MODULES;
-use crate::gpu::layout_test::differences;
+use crate::gpu::tests::layout::differences;
 
 /// Module and name of every entry point below `shaders/stages/`.
 fn kernels() -> Vec<(&'static str, String)> {

@@ -36,6 +36,16 @@ pub(crate) enum Place {
     Stdout,
 }
 
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::File(path) => path.display().fmt(f),
+            Self::Stdin => f.write_str("standard input"),
+            Self::Stdout => f.write_str("standard output"),
+        }
+    }
+}
+
 impl Place {
     pub(crate) fn error(&self, message: impl Into<String>) -> VideoError {
         let message = message.into();

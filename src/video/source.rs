@@ -52,7 +52,7 @@ enum Kind {
     Jpegs {
         bytes: Vec<u8>,
         frames: Vec<Range<usize>>,
-        path: PathBuf,
+        place: Place,
     },
 }
 
@@ -91,7 +91,10 @@ impl FrameSource {
     pub fn names(&self) -> Option<Vec<FrameName>> {
         match &self.kind {
             Kind::Folder(files) => Some(files.iter().map(|(name, _)| name.clone()).collect()),
-            Kind::Jpegs { frames, .. } => Some((0..frames.len() as u32).map(of_stream).collect()),
+            Kind::Jpegs { frames, place, .. } => {
+                let numbers = 0..frames.len() as u32;
+                Some(numbers.map(|number| of_stream(number, place)).collect())
+            }
             Kind::Y4m(_) => None,
         }
     }
@@ -117,20 +120,18 @@ impl FrameSource {
             Kind::Jpegs {
                 bytes,
                 frames,
-                path,
+                place,
             } => {
                 let Some(range) = frames.get(index as usize) else {
                     return Ok(None);
                 };
-                let name = of_stream(index);
+                let name = of_stream(index, place);
                 if !wanted(&name) {
                     return Ok(Some((name, None)));
                 }
                 let decoded = Photo::decode(&bytes[range.clone()]);
-                let (photo, warnings) = decoded.map_err(|problem| VideoError::File {
-                    path: path.clone(),
-                    message: format!("{}: {problem}", name.label),
-                })?;
+                let (photo, warnings) =
+                    decoded.map_err(|problem| place.error(format!("frame {index}: {problem}")))?;
                 let frame = VideoFrame {
                     photo,
                     pixels: Pixels::Jpeg,
@@ -142,7 +143,7 @@ impl FrameSource {
                 let Some(planes) = reader.next_frame()? else {
                     return Ok(None);
                 };
-                let name = of_stream(index);
+                let name = of_stream(index, reader.place());
                 let frame = wanted(&name).then(|| {
                     let header = reader.header();
                     let codes = decode_yuv(header, &planes);
@@ -158,9 +159,9 @@ impl FrameSource {
     }
 }
 
-fn of_stream(number: u32) -> FrameName {
+fn of_stream(number: u32, place: &Place) -> FrameName {
     FrameName {
-        label: format!("frame {number}"),
+        label: format!("frame {number} of {place}"),
         file: None,
         number,
     }
@@ -282,6 +283,6 @@ fn open_file(path: &Path) -> Result<Kind, VideoError> {
     Ok(Kind::Jpegs {
         frames: split_jpegs(&bytes),
         bytes,
-        path: path.into(),
+        place: Place::File(path.into()),
     })
 }

@@ -1,9 +1,12 @@
 //! YUV4MPEG2 streams, 8 bits a sample.
+//!
+//! By hand: a header line and raw planes, where a frame that is not rendered has to pass byte for byte, and errors say how to mend the stream.
 
 use std::io::Read;
 
 use super::{Place, VideoError};
 use crate::decode::{check_size, ensure_memory};
+use crate::refusal::Refusal;
 
 /// How many pixels share a colour sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,9 +72,9 @@ impl Header {
     }
 
     /// Parses the first line of a stream: "problem; expected ...; how to mend".
-    pub fn parse(line: &str) -> Result<Self, String> {
+    pub fn parse(line: &str) -> Result<Self, Refusal> {
         let Some(rest) = line.strip_prefix("YUV4MPEG2") else {
-            return Err("it does not begin with YUV4MPEG2; expected a Y4M stream; make one with `ffmpeg -i VIDEO -pix_fmt yuv420p -f yuv4mpegpipe -`".to_owned());
+            return Err("it does not begin with YUV4MPEG2; expected a Y4M stream; make one with `ffmpeg -i VIDEO -pix_fmt yuv420p -f yuv4mpegpipe -`".into());
         };
         let (mut width, mut height, mut rate) = (None, None, None);
         let (mut chroma, mut full_range) = (Chroma::C420, false);
@@ -92,7 +95,7 @@ impl Header {
                 'I' if !["p", "?"].contains(&value) => {
                     return Err(format!(
                         "it is interlaced ({word}); expected whole frames; deinterlace it (ffmpeg -vf yadif)"
-                    ));
+                    ).into());
                 }
                 'C' => {
                     chroma = match value {
@@ -102,7 +105,7 @@ impl Header {
                         _ => {
                             return Err(format!(
                                 "its samples are {word}; expected C420, C422 or C444 of 8 bits; convert it (ffmpeg -pix_fmt yuv420p)"
-                            ));
+                            ).into());
                         }
                     }
                 }
@@ -111,7 +114,7 @@ impl Header {
             }
         }
         let (Some(width), Some(height)) = (width, height) else {
-            return Err("its header lacks W or H; expected both; make the stream again".to_owned());
+            return Err("its header lacks W or H; expected both; make the stream again".into());
         };
         check_size(width.into(), height.into())?;
         ensure_memory((width, height), BYTES_PER_PX)?;
@@ -177,6 +180,10 @@ impl<R: Read> Y4mReader<R> {
 
     pub fn header(&self) -> &Header {
         &self.header
+    }
+
+    pub(crate) fn place(&self) -> &Place {
+        &self.place
     }
 
     /// The planes of the next frame, one after the other; `None` at the end of the stream.

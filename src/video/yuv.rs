@@ -2,6 +2,7 @@
 //!
 //! Limited range: luma 16 to 235, colour 16 to 240; full range where the stream says so. A colour sample belongs to all pixels of its block
 //! alike, so that a pixel that nothing changed keeps its luma and its share of the colour, and a block that nothing changed its bytes.
+//! By hand: crates convert whole frames, which would lose just that.
 
 use super::y4m::Header;
 

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::film::Film;
 use crate::packed::{PIXEL_EDGE, PIXEL_OUT_OF_REACH, PixelInfo};
+use crate::shared::shared;
 
 /// What is traced for a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,15 +18,16 @@ pub enum Pass {
     Real,
 }
 
-/// Samples `first..end` of a pixel, which are the next ones of its sums. Twin of the shader's struct.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub struct PixelWork {
-    /// Row-major index.
-    pub pixel: u32,
-    pub first: u32,
-    pub end: u32,
-    pub pad: u32,
+shared! {
+    /// Samples `first..end` of a pixel, which are the next ones of its sums.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+    pub struct PixelWork {
+        /// Row-major index.
+        pub pixel: u32,
+        pub first: u32,
+        pub end: u32,
+        pub pad: u32,
+    }
 }
 
 impl PixelWork {

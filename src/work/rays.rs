@@ -1,36 +1,42 @@
 //! Rays, counted by the paper's kinds.
 
-use std::ops::{Add, AddAssign, Sub};
+use std::ops::{AddAssign, Div, Sub};
 
 use bytemuck::AnyBitPattern;
 use serde::{Deserialize, Serialize};
 
-/// Rays traced, by the paper's kinds. Primary rays are among the mixed and real ones too. `u32` for what one sample or one batch of the GPU
-/// counts, `u64` for totals.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, AnyBitPattern)]
-pub struct RayCounts<T = u64> {
-    pub primary: T,
-    pub mixed: T,
-    pub real: T,
-    pub mixed_shadow: T,
-    pub real_shadow: T,
+use crate::shared::shared;
+
+shared! {
+    /// Rays that one sample, or one batch of the GPU, has traced, as [`RayCounts`].
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, AnyBitPattern)]
+    pub struct SampleRays {
+        pub primary: u32,
+        pub mixed: u32,
+        pub real: u32,
+        pub mixed_shadow: u32,
+        pub real_shadow: u32,
+    }
 }
 
-impl<T> RayCounts<T> {
-    /// Each kind by itself.
-    pub fn map<U>(self, mut f: impl FnMut(T) -> U) -> RayCounts<U> {
-        RayCounts {
-            primary: f(self.primary),
-            mixed: f(self.mixed),
-            real: f(self.real),
-            mixed_shadow: f(self.mixed_shadow),
-            real_shadow: f(self.real_shadow),
-        }
+/// Rays traced, by the paper's kinds. Primary rays are among the mixed and real ones too.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RayCounts {
+    pub primary: u64,
+    pub mixed: u64,
+    pub real: u64,
+    pub mixed_shadow: u64,
+    pub real_shadow: u64,
+}
+
+impl RayCounts {
+    /// All rays but the primary ones, which are among the mixed and real rays already.
+    pub fn traced(self) -> u64 {
+        self.mixed + self.real + self.mixed_shadow + self.real_shadow
     }
 
-    fn zip<U, V>(self, other: RayCounts<U>, f: impl Fn(T, U) -> V) -> RayCounts<V> {
-        RayCounts {
+    fn zip(self, other: Self, f: impl Fn(u64, u64) -> u64) -> Self {
+        Self {
             primary: f(self.primary, other.primary),
             mixed: f(self.mixed, other.mixed),
             real: f(self.real, other.real),
@@ -40,28 +46,39 @@ impl<T> RayCounts<T> {
     }
 }
 
-impl<T: Add<Output = T>> RayCounts<T> {
-    /// All rays but the primary ones, which are among the mixed and real rays already.
-    pub fn traced(self) -> T {
-        self.mixed + self.real + self.mixed_shadow + self.real_shadow
+impl From<SampleRays> for RayCounts {
+    fn from(rays: SampleRays) -> Self {
+        Self {
+            primary: rays.primary.into(),
+            mixed: rays.mixed.into(),
+            real: rays.real.into(),
+            mixed_shadow: rays.mixed_shadow.into(),
+            real_shadow: rays.real_shadow.into(),
+        }
     }
 }
 
-/// Counts of one size or a smaller one.
-impl<T, U> AddAssign<RayCounts<U>> for RayCounts<T>
-where
-    T: Copy + Add<Output = T> + From<U>,
-{
-    fn add_assign(&mut self, more: RayCounts<U>) {
-        *self = self.zip(more, |sum, n| sum + T::from(n));
+/// Of counts of either kind.
+impl<T: Into<Self>> AddAssign<T> for RayCounts {
+    fn add_assign(&mut self, more: T) {
+        *self = self.zip(more.into(), |sum, n| sum + n);
     }
 }
 
-impl<T: Sub<Output = T>> Sub for RayCounts<T> {
+impl Sub for RayCounts {
     type Output = Self;
 
     fn sub(self, before: Self) -> Self {
-        self.zip(before, T::sub)
+        self.zip(before, |now, before| now - before)
+    }
+}
+
+/// The mean of several, rounded down.
+impl Div<u64> for RayCounts {
+    type Output = Self;
+
+    fn div(self, count: u64) -> Self {
+        self.zip(self, |sum, _| sum / count)
     }
 }
 
@@ -80,19 +97,20 @@ mod tests {
 
     #[test]
     fn kinds_are_summed_apart_and_primary_rays_are_not_traced_twice() {
-        let one = RayCounts {
-            primary: 1u32,
+        let sample = SampleRays {
+            primary: 1,
             mixed: 2,
             real: 3,
             mixed_shadow: 4,
             real_shadow: 5,
         };
-        let mut total = RayCounts::<u64>::default();
+        let one = RayCounts::from(sample);
+        let mut total = RayCounts::default();
         total += one;
-        total += one.map(u64::from);
-        assert_eq!(total, one.map(|n| 2 * u64::from(n)));
+        total += sample;
         assert_eq!(total.traced(), 28);
-        assert_eq!(total - one.map(u64::from), one.map(u64::from));
+        assert_eq!(total - one, one);
+        assert_eq!(total / 2, one);
         assert_eq!([total, total].into_iter().sum::<RayCounts>().mixed, 8);
         let swapped = RayCounts {
             mixed: one.real,

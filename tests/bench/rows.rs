@@ -1,7 +1,7 @@
 //! Rows of error against time, their reference, their page, and the comparison with earlier ones.
 
 use super::support::{QUICK, SCENE, folder};
-use crate::support::interrupt;
+use crate::support::{interrupt, stderr};
 
 #[test]
 fn a_benchmark_writes_its_figures_plots_and_page() {
@@ -204,4 +204,27 @@ fn the_papers_table_has_a_row_a_count_of_rays() {
         assert!((fps * row["wall_secs"].as_f64().unwrap() - 1.0).abs() < 1e-9);
         assert!(row["rays_traced"].as_u64().unwrap() > 0);
     }
+}
+
+/// The loader of Vulkan speaks as soon as it is asked for devices.
+#[cfg(target_os = "linux")]
+#[test]
+fn scenes_are_read_before_graphics_devices_are_asked_for() {
+    if mixray::gpu::harness::test_device().is_none() {
+        return;
+    }
+    let folder = folder();
+    folder.write("broken.toml", "[camera]\nwidth = 0\n");
+    let asked = |scene: &str, code: i32| {
+        let line = format!(
+            "bench {scene} --backends gpu --estimators direct --rpp 1 --repeats 1 --reference-error 1 --reference-rpp 16 -o asked"
+        );
+        let output = (folder.command(&line).env("VK_LOADER_DEBUG", "all").output()).expect("runs");
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        said.contains("Vulkan Loader")
+    };
+    assert!(!asked("broken.toml", 2));
+    assert!(!asked("scene.toml broken.toml", 2));
+    assert!(asked("scene.toml", 0), "control");
 }

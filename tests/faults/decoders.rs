@@ -2,10 +2,14 @@
 
 use std::path::Path;
 
+use super::fuzz::seeds::model;
 use super::{RENDER, SMALL, assert_done, assert_refused, folder_of, shell};
 
 const PALETTE_PNG: &[u8] = include_bytes!("data/palette.png");
 const PROGRESSIVE_JPEG: &[u8] = include_bytes!("data/progressive.jpg");
+
+/// One frame, seen from the origin.
+const POSE: &str = "[[frame]]\nframe = 0\nworld_from_camera = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]]\n";
 
 /// Where a PNG chunk of this name has its length.
 fn chunk(png: &[u8], name: &[u8; 4]) -> usize {
@@ -45,6 +49,29 @@ fn a_palette_that_is_cut_off_is_an_error_that_names_the_picture() {
         assert_refused(&compared, &["photo.png"]);
     }
     let folder = folder_of(Some(("photo.png", PALETTE_PNG)), "");
+    assert_done(&shell(folder.path(), RENDER));
+}
+
+#[test]
+fn a_palette_that_is_cut_off_is_refused_as_a_frame_and_as_a_texture() {
+    let damaged = with_chunk(PALETTE_PNG, b"PLTE", &[7; 4]);
+    let folder = folder_of(None, SMALL);
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("t.toml"), POSE).expect("a writable folder");
+    std::fs::create_dir(at("in")).expect("a writable folder");
+    let sequence =
+        "$MIXRAY sequence scene.toml --frames in --trajectory t.toml --rpp 1 --backend cpu -o out";
+    std::fs::write(at("in/f_0.png"), &damaged).expect("a writable folder");
+    assert_refused(&shell(folder.path(), sequence), &["in/f_0.png"]);
+    std::fs::write(at("in/f_0.png"), PALETTE_PNG).expect("a writable folder");
+    assert_done(&shell(folder.path(), sequence));
+
+    let scene = std::fs::read_to_string(at("scene.toml")).expect("is there");
+    let with_model = scene.replace("shape = \"sphere\"", "mesh = \"model.glb\"");
+    std::fs::write(at("scene.toml"), with_model).expect("a writable folder");
+    std::fs::write(at("model.glb"), model(&damaged)).expect("a writable folder");
+    assert_refused(&shell(folder.path(), RENDER), &["model.glb", "images[0]"]);
+    std::fs::write(at("model.glb"), model(PALETTE_PNG)).expect("a writable folder");
     assert_done(&shell(folder.path(), RENDER));
 }
 
@@ -110,12 +137,18 @@ fn an_exr_whose_data_window_is_not_true_is_refused_before_memory_is_taken() {
     let folder = folder_of(Some(("photo.png", PALETTE_PNG)), "");
     let commands = [
         "$MIXRAY antialias photo.png photo.png mask.exr -o o.png",
+        "$MIXRAY noise apply --profile noise.toml photo.png photo.png mask.exr -o o.png",
+        "$MIXRAY noise apply --depth --profile noise.toml photo.png photo.png mask.exr -o o.png",
+        "$MIXRAY motion-blur --vector 20,0 photo.png photo.png mask.exr -o o.png",
         "$MIXRAY merge mask.exr -o o.png",
         "$MIXRAY compare mask.exr mask.exr",
     ];
     let whole = mask(folder.path());
     let path = folder.path().join("mask.exr");
-    assert_done(&shell(folder.path(), commands[2]));
+    let calibrate = "$MIXRAY noise calibrate --from 0.02,0.5 -o noise.toml";
+    for command in [calibrate, "$MIXRAY compare mask.exr mask.exr"] {
+        assert_done(&shell(folder.path(), command));
+    }
     let name = b"dataWindow\0box2i\0";
     let at = whole
         .windows(name.len())
@@ -138,8 +171,7 @@ fn an_exr_whose_data_window_is_not_true_is_refused_before_memory_is_taken() {
 #[test]
 fn a_header_word_of_a_stream_that_is_not_ascii_is_read_as_any_other() {
     let folder = folder_of(None, SMALL);
-    let trajectory = "[[frame]]\nframe = 0\nworld_from_camera = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]]\n";
-    std::fs::write(folder.path().join("t.toml"), trajectory).expect("a writable folder");
+    std::fs::write(folder.path().join("t.toml"), POSE).expect("a writable folder");
     let stream = |word: &[u8]| {
         let head = [b"YUV4MPEG2 W16 H12 F25:1 C444 ", word, b"\nFRAME\n"].concat();
         [head, vec![128; 16 * 12 * 3]].concat()
@@ -162,5 +194,36 @@ fn a_header_word_of_a_stream_that_is_not_ascii_is_read_as_any_other() {
             "{bytes:?}"
         );
         assert_refused(&run("Wé".as_bytes(), how), &["Wé"]);
+    }
+}
+
+#[test]
+fn a_frame_of_a_stream_is_named_with_its_stream() {
+    let folder = folder_of(None, SMALL);
+    std::fs::write(folder.path().join("t.toml"), POSE).expect("a writable folder");
+    let frame = [b"FRAME\n".as_slice(), &[128; 16 * 12 * 3]].concat();
+    let head = b"YUV4MPEG2 W16 H12 F25:1 C444\n";
+    let half = &PROGRESSIVE_JPEG[..PROGRESSIVE_JPEG.len() / 2];
+    for (name, bytes) in [
+        ("two.y4m", [head.as_slice(), &frame, &frame].concat()),
+        ("cut.y4m", [head.as_slice(), &frame, &frame[..99]].concat()),
+        ("two.mjpeg", PROGRESSIVE_JPEG.repeat(2)),
+        ("cut.mjpeg", [half, PROGRESSIVE_JPEG].concat()),
+    ] {
+        std::fs::write(folder.path().join(name), bytes).expect("a writable folder");
+    }
+    // The second frame has no pose, or the frame is damaged.
+    for (frames, frame, stream) in [
+        ("two.y4m", "frame 1", "two.y4m"),
+        ("- < two.y4m", "frame 1", "standard input"),
+        ("cut.y4m", "frame 1", "cut.y4m"),
+        ("- < cut.y4m", "frame 1", "standard input"),
+        ("two.mjpeg", "frame 1", "two.mjpeg"),
+        ("cut.mjpeg --range 0..1", "frame 0", "cut.mjpeg"),
+    ] {
+        let script = format!(
+            "$MIXRAY sequence scene.toml --trajectory t.toml --rpp 1 --backend cpu --overwrite -o o.y4m --frames {frames}"
+        );
+        assert_refused(&shell(folder.path(), &script), &[frame, stream]);
     }
 }

@@ -49,6 +49,42 @@ fn threads_that_cannot_be_made_are_done_without() {
     assert!(!said.contains("threads"), "control: {said}");
 }
 
+/// The limit on a user's processes. It does not hold for root, who takes the number of a user without any.
+#[cfg(target_os = "linux")]
+#[test]
+fn processes_that_may_not_be_made_are_done_without() {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    use std::os::unix::process::CommandExt;
+    use std::process::Command;
+
+    const NOBODY_ELSE: u32 = 64_987;
+    let folder = folder_of(None, SMALL);
+    let everyone = std::fs::Permissions::from_mode(0o777);
+    std::fs::set_permissions(folder.path(), everyone).expect("is ours");
+    let program = folder.path().join("mixray");
+    std::fs::copy(env!("CARGO_BIN_EXE_mixray"), &program).expect("a writable folder");
+    let is_root = std::fs::metadata("/proc/self").expect("procfs").uid() == 0;
+    let run = |limit: &str| {
+        let script = format!(
+            "{limit} exec ./mixray render scene.toml --rpp 1 --backend cpu --threads 4 -o out.png"
+        );
+        let mut shell = Command::new("bash");
+        shell.args(["-c", &script]).current_dir(folder.path());
+        if is_root {
+            shell.uid(NOBODY_ELSE);
+        }
+        shell.output().expect("bash")
+    };
+    let limited = run("ulimit -u 1;");
+    assert_done(&limited);
+    let said = String::from_utf8_lossy(&limited.stderr);
+    assert!(said.contains("0 of 4 threads"), "{said}");
+    let free = run("");
+    assert_done(&free);
+    let said = String::from_utf8_lossy(&free.stderr);
+    assert!(!said.contains("threads for its work"), "control: {said}");
+}
+
 #[test]
 fn a_small_stack_of_the_shell_is_enough() {
     let folder = folder_of(None, SMALL);
@@ -57,6 +93,14 @@ fn a_small_stack_of_the_shell_is_enough() {
             folder.path(),
             &format!("ulimit -s {kilobytes}; {RENDER}"),
         ));
+        // Drivers are refused before they are asked, and `auto` goes on without.
+        let on = |backend: &str| {
+            let render = RENDER.replace("cpu", backend);
+            shell(folder.path(), &format!("ulimit -s {kilobytes}; {render}"))
+        };
+        let limit = format!("stacks of {kilobytes} kB");
+        assert_refused(&on("gpu"), &[&limit, "ulimit -s"]);
+        assert_done(&on("auto"));
     }
 }
 

@@ -7,7 +7,7 @@ mod synthetic;
 
 use glam::{DVec3, Vec3};
 use mixray::scene::gltf::GltfScene;
-use mixray::scene::{Material, Primitive, TextureRef};
+use mixray::scene::{Material, Primitive};
 
 /// What the rest of mixray relies on in whatever was loaded.
 fn check_scene(scene: &GltfScene) -> Result<(), String> {
@@ -101,7 +101,7 @@ fn check_material(material: &Material) -> Result<(), String> {
     if !material.emissive.iter().all(|e| e.is_finite() && *e >= 0.0) {
         return Err("emission out of range".into());
     }
-    for reference in textures(material) {
+    for reference in material.textures() {
         let texture = &reference.texture;
         if reference.uv_set > 1
             || texture.rgba8.len() != texture.width as usize * texture.height as usize
@@ -111,21 +111,4 @@ fn check_material(material: &Material) -> Result<(), String> {
         }
     }
     Ok(())
-}
-
-fn textures(material: &Material) -> impl Iterator<Item = &TextureRef> {
-    [
-        &material.base_color_texture,
-        &material.metallic_roughness_texture,
-        &material.normal_texture,
-        &material.emissive_texture,
-        &material.specular_texture,
-        &material.specular_color_texture,
-        &material.transmission_texture,
-        &material.clearcoat_texture,
-        &material.clearcoat_roughness_texture,
-        &material.clearcoat_normal_texture,
-    ]
-    .into_iter()
-    .flatten()
 }

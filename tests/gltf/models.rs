@@ -8,7 +8,7 @@ use mixray::scene::gltf::{GltfScene, load_gltf};
 use mixray::scene::{AlphaMode, Material, Wrap};
 use serde_json::Value;
 
-use super::{check_scene, corners, textures};
+use super::{check_scene, corners};
 use crate::support::{gltf_files, shared_data};
 
 fn model(name: &str) -> Option<GltfScene> {
@@ -265,8 +265,12 @@ fn the_damaged_helmet_has_its_four_textures() {
     assert!(scene.has_materials);
     let helmet = &scene.instances[0].material;
     // Colour, metallic-roughness, normal, emission; the occlusion texture is not used.
-    assert_eq!(textures(helmet).count(), 4);
-    assert!(textures(helmet).all(|t| (t.texture.width, t.texture.height) == (2048, 2048)));
+    assert_eq!(helmet.textures().count(), 4);
+    assert!(
+        helmet
+            .textures()
+            .all(|t| (t.texture.width, t.texture.height) == (2048, 2048))
+    );
     assert_eq!(helmet.emissive, [1.0; 3]);
     let mean = |reference: &mixray::scene::TextureRef| {
         let texels = &reference.texture.rgba8;

@@ -139,7 +139,8 @@ fn agrees(found: &[Vec<f64>], truth: &[f64], bias: f64) {
 const RADIUS: f64 = 0.3;
 const CENTRE: DVec3 = DVec3::new(0.0, 0.5, -0.2);
 
-/// Straight down through a glass ball: light that enters at a distance b from the axis lands at a distance that follows from Snell's law.
+/// Straight down through a glass ball, and off it: light that meets it at a distance b from the axis lands at a distance that follows from
+/// Snell's law.
 fn the_sun_through_a_glass_ball_is_that_of_a_brute_force(backend: BackendChoice) {
     const IOR: f64 = 1.5;
     let scene = sunny_floor(
@@ -158,8 +159,8 @@ material = {{ base_color = [1, 1, 1], transmission = 1.0, roughness = 0.0, ior =
         3,
     );
     // Power by the distance from the axis at which it lands.
-    const RINGS: usize = 400;
-    const REACH: f64 = 1.2;
+    const RINGS: usize = 1200;
+    const REACH: f64 = 4.0;
     const STEPS: usize = 1_000_000;
     let mut power = vec![0.0; RINGS];
     for step in 0..STEPS {
@@ -168,7 +169,7 @@ material = {{ base_color = [1, 1, 1], transmission = 1.0, roughness = 0.0, ior =
         let (cos_i, cos_t) = ((1.0 - sin_i * sin_i).sqrt(), (1.0 - sin_t * sin_t).sqrt());
         let s = ((cos_i - IOR * cos_t) / (cos_i + IOR * cos_t)).powi(2);
         let p = ((IOR * cos_i - cos_t) / (IOR * cos_i + cos_t)).powi(2);
-        let passed = (1.0 - 0.5 * (s + p)).powi(2);
+        let passed = 1.0 - 0.5 * (s + p);
         // The ray turns by i - t at each interface, and leaves the ball that far round from where it came in.
         let (i, t) = (sin_i.asin(), sin_t.asin());
         let turned = 2.0 * (i - t);
@@ -176,14 +177,23 @@ material = {{ base_color = [1, 1, 1], transmission = 1.0, roughness = 0.0, ior =
         let leaves = DVec2::from_angle(std::f64::consts::FRAC_PI_2 - i) * RADIUS;
         let leaves = DVec2::from_angle(-around).rotate(leaves);
         let direction = DVec2::from_angle(-turned).rotate(DVec2::new(0.0, -1.0));
-        if direction.y >= 0.0 {
-            continue;
-        }
-        let landing = leaves.x - direction.x * ((CENTRE.y + leaves.y) / direction.y);
-        let ring = (landing.abs() / REACH * RINGS as f64) as usize;
-        if let Some(power) = power.get_mut(ring) {
-            *power += SUN * passed * std::f64::consts::TAU * b * RADIUS / STEPS as f64;
-        }
+        let mut land = |from: DVec2, direction: DVec2, share: f64| {
+            if direction.y >= 0.0 {
+                return;
+            }
+            let landing = from.x - direction.x * ((CENTRE.y + from.y) / direction.y);
+            let ring = (landing.abs() / REACH * RINGS as f64) as usize;
+            if let Some(power) = power.get_mut(ring) {
+                *power += SUN * share * std::f64::consts::TAU * b * RADIUS / STEPS as f64;
+            }
+        };
+        land(leaves, direction, passed * passed);
+        let enters = DVec2::from_angle(std::f64::consts::FRAC_PI_2 - i) * RADIUS;
+        land(
+            enters,
+            DVec2::new((2.0 * i).sin(), (2.0 * i).cos()),
+            1.0 - passed,
+        );
     }
     let irradiance = |at: DVec2| {
         let distance = at.distance(DVec2::new(CENTRE.x, CENTRE.z));

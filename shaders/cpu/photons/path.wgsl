@@ -14,7 +14,8 @@ import package::cpu::request::answer;
 import package::cpu::state::{FAR, PathState, REQUEST_CLOSEST_MIXED, REQUEST_SHADOW_MIXED, path_state};
 import package::cpu::vertex::{EMITS_ONLY, max_element, medium_along, stand_at, transmittance};
 import package::gpu::photons::add_splat;
-import package::material::bsdf::{BsdfSample, bsdf_eval, bsdf_is_delta, bsdf_passes_straight, bsdf_sample};
+import package::material::bsdf::{bsdf_eval, bsdf_is_polished, bsdf_passes_straight, bsdf_sample};
+import package::material::scatter::BsdfSample;
 import package::material::surface::{Surface, surface_at};
 
 struct Photon {
@@ -49,7 +50,7 @@ fn trace_photon(number: PhotonNumber, thread: u32) -> PathState {
     loop {
         let met = next_vertex(&photon);
         if !met.yes { break; }
-        if photon.chained && !bsdf_is_delta(met.s) { see(&photon, met.s, met.wi); }
+        if photon.chained && !bsdf_is_polished(met.s) { see(&photon, met.s, met.wi); }
         if photon.st.ray.depth >= frame.max_bounces || !scatter(&photon, met.s, met.wi) { break; }
     }
     return photon.st;
@@ -164,7 +165,7 @@ fn scatter(photon: ptr<function, Photon>, s: Surface, wi: vec3<f32>) -> bool {
     if !b.valid { return false; }
     let straight = b.delta && b.transmitted && bsdf_passes_straight(s);
     if !(*photon).landed && !straight {
-        if b.delta {
+        if b.delta || bsdf_is_polished(s) {
             if (*photon).st.ray.side == SIDE_REAL { return false; }
             (*photon).chained = true;
         } else {

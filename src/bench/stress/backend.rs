@@ -174,7 +174,7 @@ pub(crate) fn traced_by_shader(
 ) -> Result<Vec<Hit>, GpuError> {
     let parts = SceneParts {
         frame: Frame::zeroed(),
-        bvh_nodes: worlds.map(|world| world.gpu_nodes().as_flattened()),
+        bvh_nodes: worlds.map(WorldBvh::gpu_nodes),
         bvh_leaves: worlds.map(WorldBvh::gpu_leaves),
         ..SceneParts::default()
     };

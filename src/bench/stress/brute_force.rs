@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::accel::{Hit, Ray};
+use crate::refusal::Refusal;
 
 /// One triangle in f64: distance, and by how far the ray passes inside the edges (negative: outside), both absolute.
 pub(crate) fn exact(triangle: &[Vec3; 3], ray: &Ray) -> Option<(f64, f64)> {
@@ -40,7 +41,7 @@ pub(crate) fn judge(
     first_id: u32,
     ray: &Ray,
     hit: &Hit,
-) -> Result<(), String> {
+) -> Result<(), Refusal> {
     let reported = if hit.is_hit() {
         f64::from(hit.t)
     } else {
@@ -53,16 +54,16 @@ pub(crate) fn judge(
         let (t_slack, edge_slack) = tolerance(triangle, ray, t);
         if id == hit.triangle {
             if inside < -edge_slack {
-                return Err(format!("triangle {id} reported, {inside:e} outside"));
+                return Err(format!("triangle {id} reported, {inside:e} outside").into());
             }
             if (t - reported).abs() > t_slack {
-                return Err(format!("triangle {id} at {t}, reported at {reported}"));
+                return Err(format!("triangle {id} at {t}, reported at {reported}").into());
             }
         }
         let inside_interval =
             t > f64::from(ray.t_min) + t_slack && t < f64::from(ray.t_max) - t_slack;
         if inside > edge_slack && inside_interval && t + t_slack < reported {
-            return Err(format!("triangle {id} at {t} lost, reported {reported}"));
+            return Err(format!("triangle {id} at {t} lost, reported {reported}").into());
         }
     }
     Ok(())

@@ -1,5 +1,7 @@
 //! Meshes and rays that are hard on a tracer, the same on every run.
 
+use std::f32::consts::{PI, TAU};
+
 use glam::Vec3;
 
 use crate::accel::Ray;
@@ -7,10 +9,10 @@ use crate::packed::NONE;
 use crate::scene::Primitive;
 
 /// A repeatable generator: SplitMix64.
-pub(crate) struct Random(pub(crate) u64);
+pub struct Random(pub u64);
 
 impl Random {
-    pub(crate) fn bits(&mut self) -> u64 {
+    pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut x = self.0;
         x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -19,16 +21,16 @@ impl Random {
     }
 
     /// In [0, 1).
-    pub(crate) fn unit(&mut self) -> f32 {
+    pub fn unit(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / (1 << 24) as f32
     }
 
     /// In [-1, 1) on each axis.
-    pub(crate) fn cube(&mut self) -> Vec3 {
+    pub fn cube(&mut self) -> Vec3 {
         Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - Vec3::ONE
     }
 
-    pub(crate) fn direction(&mut self) -> Vec3 {
+    pub fn direction(&mut self) -> Vec3 {
         loop {
             let v = self.cube();
             let squared = v.length_squared();
@@ -39,7 +41,7 @@ impl Random {
     }
 }
 
-pub(crate) fn ray(origin: Vec3, direction: Vec3) -> Ray {
+pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
     Ray {
         origin,
         direction,
@@ -50,7 +52,7 @@ pub(crate) fn ray(origin: Vec3, direction: Vec3) -> Ray {
 }
 
 /// Random triangles in the unit cube with edges of about `size`.
-pub(crate) fn soup(count: usize, size: f32, seed: u64) -> Vec<[Vec3; 3]> {
+pub fn soup(count: usize, size: f32, seed: u64) -> Vec<[Vec3; 3]> {
     let mut random = Random(seed);
     (0..count)
         .map(|_| {
@@ -65,7 +67,7 @@ pub(crate) fn soup(count: usize, size: f32, seed: u64) -> Vec<[Vec3; 3]> {
 }
 
 /// Long triangles across the unit cube, about `width` wide.
-pub(crate) fn slivers(count: usize, seed: u64, width: f32) -> Vec<[Vec3; 3]> {
+pub fn slivers(count: usize, seed: u64, width: f32) -> Vec<[Vec3; 3]> {
     let mut random = Random(seed);
     (0..count)
         .map(|_| {
@@ -75,15 +77,34 @@ pub(crate) fn slivers(count: usize, seed: u64, width: f32) -> Vec<[Vec3; 3]> {
         .collect()
 }
 
-/// A closed sphere of `2 * rings * segments` triangles whose neighbours share vertices bit for bit.
-pub(crate) fn sphere(rings: usize, segments: usize, radius: f32) -> Vec<[Vec3; 3]> {
+/// A closed sphere of `2 * segments * (rings - 1)` triangles whose neighbours share vertices bit for bit.
+pub fn sphere(rings: usize, segments: usize, radius: f32) -> Vec<[Vec3; 3]> {
+    displaced_sphere(rings, segments, |_, _| radius)
+}
+
+/// The same of radius about 1, with bumps.
+pub fn bumpy_sphere(rings: usize, segments: usize) -> Vec<[Vec3; 3]> {
+    displaced_sphere(rings, segments, |theta, phi| {
+        let bump = (9.0 * theta).sin() * (7.0 * phi).cos()
+            + 0.5 * (23.0 * theta).cos() * (19.0 * phi).sin();
+        1.0 + 0.08 * bump * theta.sin()
+    })
+}
+
+/// `radius`: at an angle from the pole and one around the axis.
+fn displaced_sphere(
+    rings: usize,
+    segments: usize,
+    radius: impl Fn(f32, f32) -> f32,
+) -> Vec<[Vec3; 3]> {
     let point = |ring: usize, segment: usize| {
+        let theta = PI * ring as f32 / rings as f32;
+        let phi = TAU * (segment % segments) as f32 / segments as f32;
         if ring == 0 || ring == rings {
+            let radius = radius(theta, 0.0);
             return Vec3::new(0.0, if ring == 0 { radius } else { -radius }, 0.0);
         }
-        let theta = std::f32::consts::PI * ring as f32 / rings as f32;
-        let phi = std::f32::consts::TAU * (segment % segments) as f32 / segments as f32;
-        radius
+        radius(theta, phi)
             * Vec3::new(
                 theta.sin() * phi.cos(),
                 theta.cos(),
@@ -107,7 +128,7 @@ pub(crate) fn sphere(rings: usize, segments: usize, radius: f32) -> Vec<[Vec3; 3
 }
 
 /// The twelve triangles of a box about the origin with these half-sizes; neighbours share vertices bit for bit.
-pub(crate) fn cuboid(half: Vec3) -> Vec<[Vec3; 3]> {
+pub fn cuboid(half: Vec3) -> Vec<[Vec3; 3]> {
     let corner = |i: u32| {
         let side = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
         half * Vec3::new(side(1), side(2), side(4))
@@ -127,7 +148,7 @@ pub(crate) fn cuboid(half: Vec3) -> Vec<[Vec3; 3]> {
 }
 
 /// A ray about a box of half-size `scale` around `center`: along an axis, at random or towards the box; some with an interval.
-pub(crate) fn random_ray(random: &mut Random, center: Vec3, scale: f32) -> Ray {
+pub fn random_ray(random: &mut Random, center: Vec3, scale: f32) -> Ray {
     let origin = center + random.cube() * 2.0 * scale;
     let direction = match random.bits() % 4 {
         0 => random.direction(),

@@ -8,7 +8,7 @@ pub(crate) mod backend;
 pub(crate) mod brute_force;
 mod cases;
 mod light;
-pub(crate) mod meshes;
+pub mod meshes;
 mod oracle;
 mod pictures;
 mod report;

@@ -7,7 +7,6 @@ use serde::Serialize;
 use super::command_line;
 use crate::bench::{Axis, FORMAT, Machine, Plot, Report, Shot, Truth, csv, page, plots};
 use crate::cli::{Failure, say};
-use crate::decode::{self, MAX_TEXT_BYTES};
 use crate::output::quick::{write_bytes, write_text};
 use crate::scene::Composite;
 
@@ -67,23 +66,4 @@ pub(super) fn write_pictures(
         &format!("the report is {}", folder.join("index.html").display()),
     );
     Ok(())
-}
-
-pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    decode::read_text(path, MAX_TEXT_BYTES)
-        .map_err(|reason| Failure(format!("{}: {reason}", path.display())))
-}
-
-pub(super) fn read_report(path: &Path) -> Result<Report, Failure> {
-    let problem = |reason: String| Failure(format!("{}: {reason}", path.display()));
-    let text = read_text(path)?;
-    let value: serde_json::Value = serde_json::from_str(&text)
-        .map_err(|error| problem(format!("is no results.json: {error}")))?;
-    let format = value.get("format").and_then(serde_json::Value::as_u64);
-    if format != Some(u64::from(FORMAT)) {
-        return Err(problem(format!(
-            "is no results.json of format {FORMAT}; make it again with this version"
-        )));
-    }
-    serde_json::from_value(value).map_err(|error| problem(format!("is no results.json: {error}")))
 }

@@ -199,17 +199,16 @@ impl RaysFlag {
     }
 }
 
-/// Scenes by different names, to be rendered by `backend`; `by` divides their sizes.
+/// Scenes by different names, to be rendered on the CPU until told otherwise; `by` divides their sizes.
 pub(super) fn load_scenes(
     paths: &[PathBuf],
     flags: SceneFlags,
     by: u32,
-    backend: BackendChoice,
 ) -> Result<Vec<Scene>, Failure> {
     let mut scenes: Vec<Scene> = Vec::new();
     for path in paths {
         let mut scene = shrink(flags.load(path)?, by);
-        scene.settings.backend = backend;
+        scene.settings.backend = BackendChoice::Cpu;
         for warning in &scene.warnings {
             say("warning", warning);
         }

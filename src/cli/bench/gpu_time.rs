@@ -10,7 +10,6 @@ use super::flags::{OutputFlags, RaysFlag, finish, load_scenes};
 use crate::bench::{Machine, gpu_time, gpu_time_markdown, gpu_time_text};
 use crate::cli::scene_flags::SceneFlags;
 use crate::cli::{Failure, Outcome, interrupt, print, progress};
-use crate::scene::BackendChoice;
 
 /// Where the time of a GPU render goes, kernel by kernel, at each number of rays per pixel
 ///
@@ -34,12 +33,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let docs = arguments.output.start("gpu-time")?;
     let interrupted = interrupt::watch()?;
-    let scenes = load_scenes(
-        &arguments.scenes,
-        arguments.scene,
-        arguments.shrink,
-        BackendChoice::Cpu,
-    )?;
+    let scenes = load_scenes(&arguments.scenes, arguments.scene, arguments.shrink)?;
     let machine = Machine::this(true);
     let folder = arguments.output.make_folder(&["gpu-time.json"])?;
     let rays_per_pixel = arguments.rays.ascending();

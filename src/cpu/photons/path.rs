@@ -15,7 +15,7 @@ use crate::cpu::state::*;
 use crate::cpu::vertex::{EMITS_ONLY, medium_along, stand_at, transmittance};
 use crate::film::Splat;
 use crate::material::{
-    BsdfSample, Surface, bsdf_eval, bsdf_is_delta, bsdf_passes_straight, bsdf_sample, surface_at,
+    BsdfSample, Surface, bsdf_eval, bsdf_is_polished, bsdf_passes_straight, bsdf_sample, surface_at,
 };
 use crate::math::{dot3, hash_combine};
 use crate::packed::{
@@ -81,7 +81,7 @@ pub fn trace_photon(
         let Some((s, wi)) = next_vertex(scene, &mut photon) else {
             break;
         };
-        if photon.chained && !bsdf_is_delta(&s) {
+        if photon.chained && !bsdf_is_polished(&s) {
             if let Some(seen) = see(scene, &mut photon, &s, wi) {
                 splat(seen);
             }
@@ -241,7 +241,7 @@ fn scatter(scene: &PackedScene, photon: &mut Photon, s: &Surface, wi: Vec3) -> b
     }
     let straight = b.delta && b.transmitted && bsdf_passes_straight(s);
     if !photon.landed && !straight {
-        if b.delta {
+        if b.delta || bsdf_is_polished(s) {
             // A smooth real surface on the way: the eye's paths bring that.
             if photon.st.ray.side == SIDE_REAL {
                 return false;

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::path::{PhotonNumber, trace_photon};
 use crate::packed::PackedScene;
+use crate::work::RayCounts;
 
 /// Photons of the pilot, and of one of its tasks.
 const PILOT_PHOTONS: u32 = 1 << 13;
@@ -63,7 +64,7 @@ fn measure(scene: &PackedScene, first: u32) -> (f64, f64) {
                 squares += square;
             }
         });
-        rays += f64::from(st.rays.traced());
+        rays += RayCounts::from(st.rays).traced() as f64;
     }
     (squares, rays)
 }

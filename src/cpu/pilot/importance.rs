@@ -9,7 +9,7 @@ use crate::light::environment::env_sample;
 use crate::math::{hash_combine, hash_u32, luminance, uniform_from_bits};
 use crate::packed::{
     Frame, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT,
-    LIGHT_TRIANGLE, Light, NONE, PackedScene,
+    LIGHT_TRIANGLE, Light, NONE, PackedScene, SIDE_REAL, SIDE_VIRTUAL,
 };
 
 /// Importance per share of the sky (cosine-weighted) covered by virtual geometry.
@@ -40,17 +40,20 @@ impl<'a> PilotLights<'a> {
         let examined: Vec<&Light> = scene
             .lights
             .iter()
-            .filter(|l| l.side == 0 && l.kind != LIGHT_ENVIRONMENT)
+            .filter(|l| l.side == SIDE_REAL && l.kind != LIGHT_ENVIRONMENT)
             .collect();
         let emission = scene
             .lights
             .iter()
-            .filter(|l| l.side == 1 && is_area(l))
+            .filter(|l| l.side == SIDE_VIRTUAL && is_area(l))
             .map(|l| luminance(Vec3::new(l.radiance[0], l.radiance[1], l.radiance[2])))
             .fold(0.0, f32::max);
         Self {
             uncertain: examined.len() > MAX_LIGHTS_EXAMINED
-                || scene.lights.iter().any(|l| l.side == 1 && !is_area(l)),
+                || scene
+                    .lights
+                    .iter()
+                    .any(|l| l.side == SIDE_VIRTUAL && !is_area(l)),
             examined,
             reach_gain: REACH_GAIN * (1.0 + emission * scene.frame.exposure_scale),
             directions: environment_directions(scene),

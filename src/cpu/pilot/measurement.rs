@@ -4,12 +4,13 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::blocks::Blocks;
-use crate::cpu::estimator::{advance, begin_sample};
-use crate::cpu::request::answer;
-use crate::cpu::state::{PathState, STAGE_DONE};
+use crate::cpu::batch::run_alone;
+use crate::cpu::estimator::begin_sample;
+use crate::cpu::state::PathState;
 use crate::film::is_unusable;
 use crate::math::{hash_combine, hash_u32};
 use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene};
+use crate::work::RayCounts;
 
 /// Pixels sampled in a block through which no beam meets virtual geometry, and in others.
 const PIXELS: u32 = 1;
@@ -47,8 +48,8 @@ pub struct BlockMoments {
     pub near_share: f32,
 }
 
-/// Takes two samples in some pixels of every block. `scene.pixels` must ask for every sample's difference.
-pub fn measure(scene: &PackedScene, blocks: &Blocks) -> Vec<BlockMoments> {
+/// Takes two samples in some pixels of every block; `done` hears of each. `scene.pixels` must ask for every sample's difference.
+pub fn measure(scene: &PackedScene, blocks: &Blocks, done: impl Fn() + Sync) -> Vec<BlockMoments> {
     (0..blocks.count())
         .into_par_iter()
         .map(|block| {
@@ -73,6 +74,7 @@ pub fn measure(scene: &PackedScene, blocks: &Blocks) -> Vec<BlockMoments> {
                     add_pixel(scene, pixel as u32, 2 * i, &mut moments);
                 }
             }
+            done();
             moments
         })
         .collect()
@@ -81,10 +83,7 @@ pub fn measure(scene: &PackedScene, blocks: &Blocks) -> Vec<BlockMoments> {
 fn add_pixel(scene: &PackedScene, pixel: u32, index: u32, moments: &mut BlockMoments) {
     let [a, b] = [index, index + 1].map(|index| {
         let mut st = begin_sample(scene, pixel, index, false);
-        while st.path.stage != STAGE_DONE {
-            answer(scene, &mut st);
-            advance(scene, &mut st);
-        }
+        run_alone(scene, &mut st);
         st
     });
     let radiance = |st: &PathState| st.result.radiance * scene.frame.exposure_scale;
@@ -108,5 +107,5 @@ fn add_pixel(scene: &PackedScene, pixel: u32, index: u32, moments: &mut BlockMom
 }
 
 fn cost_of(st: &PathState) -> f32 {
-    st.rays.traced() as f32 + COST_OF_A_SAMPLE
+    RayCounts::from(st.rays).traced() as f32 + COST_OF_A_SAMPLE
 }

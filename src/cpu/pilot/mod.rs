@@ -23,20 +23,30 @@ use importance::{PilotLights, importance};
 
 use crate::packed::{
     ESTIMATOR_PAPER, FRAME_AOVS, FRAME_BOTH_SHADOWS, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL,
-    PIXEL_OUT_OF_REACH, PackedScene, PixelInfo,
+    PIXEL_OUT_OF_REACH, PackedScene, PixelInfo, SIDE_VIRTUAL,
 };
+use crate::work::Meter;
 
 /// Fewer rays per pixel than this are not worth a measurement.
 const MIN_RAYS_TO_MEASURE: u32 = 8;
 /// Seed of the pilot's own samples, which no render's samples should equal.
 const SEED: u32 = 0x9d2c_5681;
 
+/// What a block that is measured takes, where the beam of a pixel is one step.
+const STEPS_OF_A_BLOCK: u64 = 64;
+
+/// What [`pilot`] counts at the most.
+pub fn pilot_steps(frame: &Frame) -> u64 {
+    let (width, height) = (frame.width as usize, frame.height as usize);
+    (width * height) as u64 + STEPS_OF_A_BLOCK * Blocks::of(width, height).count() as u64
+}
+
 /// Fills `scene.pixels`. The same for every seed, sample range and backend.
-pub fn pilot(scene: &mut PackedScene) {
+pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
     let (width, height) = (scene.frame.width as usize, scene.frame.height as usize);
     let nothing_virtual = scene.frame.sphere_count == 0
         && scene.swept_spheres.is_empty()
-        && !scene.lights.iter().any(|l| l.side == 1);
+        && !scene.lights.iter().any(|l| l.side == SIDE_VIRTUAL);
     scene.photons_per_ray = 0;
     if nothing_virtual {
         scene.pixels = vec![PixelInfo::uniform(PIXEL_OUT_OF_REACH); width * height];
@@ -48,7 +58,12 @@ pub fn pilot(scene: &mut PackedScene) {
     };
     let flags: Vec<u32> = (0..width * height)
         .into_par_iter()
-        .map(|i| flags_of(scene, &Beam::of_pixel(&scene.frame, &pinhole, i as u32)))
+        .map(|i| {
+            if i % width == 0 {
+                meter.add(width as u64);
+            }
+            flags_of(scene, &Beam::of_pixel(&scene.frame, &pinhole, i as u32))
+        })
         .collect();
     if photons_traced(&scene.frame) {
         scene.photons_per_ray = unmeasured(width * height);
@@ -80,7 +95,7 @@ pub fn pilot(scene: &mut PackedScene) {
             .map(|&importance| Rates::from_importance(importance))
             .collect()
     } else {
-        let measured = measure(scene, &blocks, &flags);
+        let measured = measure(scene, &blocks, &flags, meter);
         allocate(&blocks, &measured, &importances)
     };
     scene.pixels = flags
@@ -104,6 +119,7 @@ fn measure(
     scene: &mut PackedScene,
     blocks: &Blocks,
     flags: &[u32],
+    meter: &Meter<'_>,
 ) -> Vec<measurement::BlockMoments> {
     let frame = scene.frame;
     scene.frame.seed = if scene.frame.seed == SEED {
@@ -114,7 +130,7 @@ fn measure(
     // Neither planes nor needless rays shall show in the plan.
     scene.frame.flags &= !(FRAME_AOVS | FRAME_BOTH_SHADOWS);
     scene.pixels = flags.iter().copied().map(PixelInfo::uniform).collect();
-    let measured = measurement::measure(scene, blocks);
+    let measured = measurement::measure(scene, blocks, || meter.add(STEPS_OF_A_BLOCK));
     if photons_traced(&scene.frame) {
         scene.photons_per_ray = photons_per_ray(scene, eye_moments(blocks, &measured));
     }

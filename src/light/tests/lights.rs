@@ -1,5 +1,6 @@
 //! The choice of a light, delta lights and emissive triangles.
 
+use crate::work::Watcher;
 use glam::Vec3;
 
 use super::{Random, fit, lit_by};
@@ -153,7 +154,7 @@ fn textured_triangle() -> PackedScene {
     instance.primitive = primitive.into();
     let mut scene = test_scene();
     scene.objects.push(mesh);
-    PackedScene::build(&scene).expect("packs")
+    PackedScene::build(&scene, &Watcher::none()).expect("packs")
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod gpu;
 mod lights;
 mod quads;
 
+use crate::work::Watcher;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -74,7 +75,7 @@ pub fn lit_by(environment: Option<Environment>, lights: &[LightKind]) -> PackedS
             side: Side::Real,
         })
         .collect();
-    PackedScene::build(&scene).expect("packs")
+    PackedScene::build(&scene, &Watcher::none()).expect("packs")
 }
 
 const ROWS: usize = 24;

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::Vec3;
 
 use super::kinds::*;
-use super::{Random, around, plain_surface};
+use super::{Random, around};
 use crate::material::normal::valid_shading_normal;
 use crate::material::{Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_sample};
 use crate::packed::{MATERIAL_THIN_WALLED, MATERIAL_UNLIT};

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use glam::{DVec3, Vec3};
 
 use super::kinds::*;
-use super::{Random, around, plain_surface};
+use super::{Random, around};
 use crate::material::{Surface, bsdf_albedo, bsdf_directional_albedo_bound, bsdf_sample};
 
 /// Mean weight of samples: the directional albedo, and its standard error.

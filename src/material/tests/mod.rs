@@ -10,7 +10,6 @@ mod twins;
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 
-use crate::material::Surface;
 use crate::packed::{Material, NONE, PackedScene, Triangle, Vertex};
 
 /// PCG-XSH-RR 32 (O'Neill 2014): test inputs that share nothing with the renderer's own numbers.
@@ -110,34 +109,6 @@ pub fn one_triangle(corners: [[f32; 3]; 3], material: Material) -> PackedScene {
     scene.vertices = vertices;
     scene.materials = vec![material];
     scene
-}
-
-/// A surface under test with its normal askew to the axes: white, fully rough dielectric, front.
-pub fn plain_surface() -> Surface {
-    let normal = Vec3::new(0.36, 0.48, 0.8).normalize();
-    Surface {
-        position: Vec3::ZERO,
-        error: 0.0,
-        ng: normal,
-        ns: normal,
-        coat_ns: normal,
-        base_color: Vec3::ONE,
-        metallic: 0.0,
-        ggx_alpha: 1.0,
-        ior: 1.5,
-        specular: 1.0,
-        specular_color: Vec3::ONE,
-        transmission: 0.0,
-        clearcoat: 0.0,
-        coat_alpha: 0.0,
-        emission: Vec3::ZERO,
-        coverage: 1.0,
-        front: true,
-        flags: 0,
-        material: 0,
-        light: NONE,
-        object: 0,
-    }
 }
 
 /// Direction at `theta` radians from `axis`, at azimuth `phi` in a frame of the tests' own.

@@ -188,16 +188,19 @@ macro_rules! content {
         }
     )*};
 }
-pub(in crate::scene) use content;
+pub(crate) use content;
 
 /// [`Content`] of choices: their names.
 macro_rules! content_by_name {
     ($($type:ty)*) => {$(
-        impl Content for $type {
-            fn add_to(&self, hash: &mut ContentHash) {
-                self.name().add_to(hash);
+        impl $crate::scene::fingerprint::Content for $type {
+            fn add_to(&self, hash: &mut $crate::scene::fingerprint::ContentHash) {
+                $crate::scene::fingerprint::Content::add_to(
+                    $crate::scene::reader::Choice::name(*self),
+                    hash,
+                );
             }
         }
     )*};
 }
-pub(super) use content_by_name;
+pub(crate) use content_by_name;

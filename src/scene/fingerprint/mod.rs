@@ -1,12 +1,12 @@
 //! Fingerprints tell scenes apart by what they hold.
 
-mod content;
+pub(crate) mod content;
 mod parts;
 #[cfg(test)]
 mod tests;
 
-pub(super) use content::content;
 pub use content::{Content, ContentHash};
+pub(crate) use content::{content, content_by_name};
 
 use super::{Scene, Settings};
 

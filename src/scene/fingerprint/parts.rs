@@ -1,16 +1,12 @@
 //! What of a scene's parts is content. Names and places on disk are not.
 
-use super::content::{content, content_by_name};
-use super::{Content, ContentHash};
+use super::{Content, ContentHash, content, content_by_name};
 use crate::scene::animation::{AnimatedNode, Animation, InstanceAnimation, Interpolation, Track};
-use crate::scene::reader::Choice;
 use crate::scene::trajectory::{Entry, EntryKey, Intrinsics};
 use crate::scene::{
-    AlphaMode, AntialiasSettings, Aperture, BackendChoice, Camera, CartoonSettings, CartoonStyle,
-    Composite, Environment, EnvironmentMap, Estimator, Exposure, FlowSettings, Instance, Lens,
-    Light, LightKind, Material, MotionBlurMethod, MotionBlurSettings, MotionKey, NoiseBin,
-    NoiseFit, NoiseMethod, NoiseProfile, NoiseSettings, Object, Photo, Primitive, SamplerKind,
-    Settings, Shutter, Side, Stages, Texture, TextureRef, Wrap,
+    AlphaMode, Aperture, BackendChoice, Camera, Composite, Environment, EnvironmentMap, Estimator,
+    Exposure, Instance, Lens, Light, LightKind, MotionKey, Object, Photo, Primitive, SamplerKind,
+    Settings, Shutter, Side, Texture, TextureRef, Wrap,
 };
 
 content! {
@@ -31,31 +27,17 @@ content! {
     AnimatedNode { parent, rest, translation, rotation, scale }
     Track { times, values, interpolation }
 
-    Material {
-        base_color, base_color_texture, metallic, roughness, metallic_roughness_texture, normal_texture, normal_scale, emissive,
-        emissive_texture, alpha_mode, unlit, ior, specular, specular_texture, specular_color, specular_color_texture, transmission,
-        transmission_texture, thin_walled, attenuation_color, attenuation_distance_m, clearcoat, clearcoat_texture, clearcoat_roughness,
-        clearcoat_roughness_texture, clearcoat_normal_texture, clearcoat_normal_scale; name }
     TextureRef { texture, uv_set, transform }
     Texture { width, height, rgba8, wrap_u, wrap_v, nearest; name }
 
     Settings { rays_per_pixel, max_bounces, clamp_indirect, seed, estimator, sampler, composite, backend, exposure }
-    Stages { antialias, motion_blur, noise, cartoon }
-    AntialiasSettings { beta }
-    MotionBlurSettings { method, min_length_px, max_length_px, step_px, centre_opacity }
-    NoiseSettings { profile, method, scale, texture_size, magnification, update_delay_frames, eight_bit }
-    NoiseProfile { bins, autocorrelation, channel_correlation, fit; sources }
-    NoiseBin { mean, sigma, low, high, samples, filled }
-    NoiseFit { a, b }
-    CartoonSettings { style, shrunk_width, shrunk_height, iterations, sigma_p, alpha, beta, s0, s1, a0, a1, flow }
-    FlowSettings { tensor_sigma_px, edge_sigma_px, line_sigma_px, tau, t0, t1 }
 
     Intrinsics { size, fx, fy, cx, cy, distortion }
     Entry { key, time_secs, world_from_camera, intrinsics, focus_distance_m; place }
 }
 
 content_by_name! {
-    Estimator SamplerKind Composite BackendChoice MotionBlurMethod NoiseMethod CartoonStyle
+    Estimator SamplerKind Composite BackendChoice
 }
 
 /// [`Content`] of what is one of several things: which, and what that holds.

@@ -75,7 +75,8 @@ impl<'a> Materials<'a> {
             }
         };
         self.read.insert(index, material.clone());
-        let lacks_uv = textures_of(&material)
+        let lacks_uv = material
+            .textures()
             .any(|texture| primitive.uvs[texture.uv_set as usize & 1].is_empty());
         if lacks_uv {
             notes.add(Note::MissingUv, 1, &primitive.name);
@@ -327,21 +328,4 @@ fn transform_rows(transform: &TextureTransform) -> [f32; 6] {
         (cos * scale_v) as f32,
         offset_v,
     ]
-}
-
-fn textures_of(material: &Material) -> impl Iterator<Item = &TextureRef> {
-    [
-        &material.base_color_texture,
-        &material.metallic_roughness_texture,
-        &material.normal_texture,
-        &material.emissive_texture,
-        &material.specular_texture,
-        &material.specular_color_texture,
-        &material.transmission_texture,
-        &material.clearcoat_texture,
-        &material.clearcoat_roughness_texture,
-        &material.clearcoat_normal_texture,
-    ]
-    .into_iter()
-    .flatten()
 }

@@ -1,6 +1,8 @@
 //! COLMAP's text model: `cameras.txt`, `images.txt`, and `points3D.txt` where it is there.
 //!
 //! Images hold camera-from-world in OpenCV's axes; its pixel coordinates have their origin at the corner, as ours do.
+//!
+//! By hand: lines of words, where an error has to name the line and what was expected on it.
 
 use std::collections::HashMap;
 use std::path::Path;

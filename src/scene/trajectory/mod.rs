@@ -25,6 +25,7 @@ use super::pose::rigid;
 use super::projection::check_distortion;
 use super::{Camera, SceneError};
 use crate::decode::{MAX_POSES_BYTES, read_file};
+use crate::refusal::Refusal;
 
 /// Why a trajectory was refused. Displays as one line: "problem; expected ...; how to mend", with the file before it.
 #[derive(Debug, thiserror::Error)]
@@ -42,6 +43,9 @@ pub enum TrajectoryError {
     #[error("{}: {message}", path.display())]
     File { path: PathBuf, message: String },
 }
+
+/// What [`Trajectory::read`] tells apart, as the help of a command says it.
+pub const FORMATS: &str = ".toml or .json of this program, transforms.json of nerfstudio, COLMAP's text model (folder or images.txt), or a TUM trajectory";
 
 pub(super) type Result<T> = std::result::Result<T, TrajectoryError>;
 
@@ -69,13 +73,13 @@ impl Intrinsics {
         &self,
         (width, height): (u32, u32),
         world_from_camera: DMat4,
-    ) -> std::result::Result<Camera, String> {
+    ) -> std::result::Result<Camera, Refusal> {
         if let Some((own_width, own_height)) = self.size
             && (own_width, own_height) != (width, height)
         {
             return Err(format!(
                 "the intrinsics are those of {own_width} x {own_height} pixels where the frames have {width} x {height}"
-            ));
+            ).into());
         }
         let camera = Camera {
             width,

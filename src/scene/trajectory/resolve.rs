@@ -11,7 +11,7 @@ use super::{
 /// A frame as its source names it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameName {
-    /// "frame_0012.png", or "frame 12" of a stream.
+    /// "frame_0012.png", or "frame 12 of standard input".
     pub label: String,
     /// The file's name; `None` in a stream.
     pub file: Option<String>,

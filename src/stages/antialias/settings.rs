@@ -1,6 +1,7 @@
 //! `[antialias]`.
 
 use crate::scene::error::Result;
+use crate::scene::fingerprint::content;
 use crate::scene::reader::Table;
 use crate::stages::table::{StageSettings, read_into};
 
@@ -15,6 +16,10 @@ impl Default for AntialiasSettings {
     fn default() -> Self {
         Self { beta: 0.8 }
     }
+}
+
+content! {
+    AntialiasSettings { beta }
 }
 
 impl StageSettings for AntialiasSettings {

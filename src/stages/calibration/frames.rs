@@ -118,7 +118,7 @@ impl Frame {
             path: path.to_path_buf(),
             problem,
         };
-        let (width, height, codes) = read_codes(path).map_err(failed)?;
+        let (width, height, codes) = read_codes(path).map_err(|problem| failed(problem.into()))?;
         let (codes, top) = match codes {
             EncodedPhoto::Srgb8(codes) => (codes.iter().map(|c| c.map(u16::from)).collect(), 255),
             EncodedPhoto::Srgb16(codes) => (codes, u16::MAX),

@@ -1,6 +1,7 @@
 //! `[cartoon]`.
 
 use crate::scene::error::Result;
+use crate::scene::fingerprint::{content, content_by_name};
 use crate::scene::reader::{Choice, Node, Table};
 use crate::stages::table::{StageSettings, read_into};
 
@@ -97,6 +98,13 @@ impl CartoonSettings {
     /// Longest side of the simplified picture, pixels.
     pub const MAX_SHRUNK_PX: u32 = 32768;
 }
+
+content! {
+    CartoonSettings { style, shrunk_width, shrunk_height, iterations, sigma_p, alpha, beta, s0, s1, a0, a1, flow }
+    FlowSettings { tensor_sigma_px, edge_sigma_px, line_sigma_px, tau, t0, t1 }
+}
+
+content_by_name! { CartoonStyle }
 
 impl StageSettings for CartoonSettings {
     const KEYS: &'static [&'static str] = &[

@@ -1,6 +1,7 @@
 //! `[motion_blur]`.
 
 use crate::scene::error::Result;
+use crate::scene::fingerprint::{content, content_by_name};
 use crate::scene::reader::{Choice, Node, Table};
 use crate::stages::table::{StageSettings, read_into};
 
@@ -42,6 +43,12 @@ impl Default for MotionBlurSettings {
         }
     }
 }
+
+content! {
+    MotionBlurSettings { method, min_length_px, max_length_px, step_px, centre_opacity }
+}
+
+content_by_name! { MotionBlurMethod }
 
 impl StageSettings for MotionBlurSettings {
     const KEYS: &'static [&'static str] = &[

@@ -5,7 +5,7 @@
 
 pub mod mutate;
 mod readers;
-mod seeds;
+pub mod seeds;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};

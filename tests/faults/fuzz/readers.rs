@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
+use mixray::bench::{Report, against, csv, markdown, plots, text as table};
 use mixray::output::{ChannelFile, read_film};
 use mixray::scene::gltf::load_gltf;
 use mixray::scene::trajectory::{Trajectory, read_intrinsics};
 use mixray::scene::{NoiseProfile, Photo, load};
+use mixray::sequence::{SequenceOptions, check_poses};
 use mixray::video::FrameSource;
 
 use super::mutate::Random;
@@ -73,6 +75,8 @@ pub fn all() -> Vec<Reader> {
             intrinsics,
         ),
         reader("profile", "noise.toml", seeds::profiles, text, profile),
+        reader("points", "points.csv", seeds::points, text, points),
+        reader("results", "results.json", seeds::results, text, results),
     ]
 }
 
@@ -220,5 +224,48 @@ fn profile(path: &Path) -> Outcome {
             profile.bins.iter().flat_map(|bin| bin.sigma),
             "a noise profile",
         )
+    })
+}
+
+/// Points against poses that are right.
+fn points(path: &Path) -> Outcome {
+    beside(path, "poses.json", &seeds::json_poses()[0]);
+    let mut options = SequenceOptions::new(
+        path.with_file_name("scene.toml"),
+        "frames",
+        path.with_file_name("poses.json"),
+        "out",
+    );
+    options.frames = None;
+    named_outcome(
+        path,
+        check_poses(&options, Some(path), &|_| {}),
+        |reprojection| finite([reprojection.worst_px], "a reprojection"),
+    )
+}
+
+/// Earlier results, and all that is made from them.
+fn results(path: &Path) -> Outcome {
+    named_outcome(path, Report::read(path), |report| {
+        let rows = report.rows.iter();
+        finite(
+            rows.flat_map(|row| [row.cpu_secs, row.errors.all.rmse, row.mse_sd]),
+            "a row",
+        )?;
+        let verdict = against(&report, &report, 0.05);
+        let compared = verdict.changes.len() + verdict.not_compared.len();
+        if compared != report.rows.len() {
+            return Err(format!(
+                "{compared} of {} rows are compared",
+                report.rows.len()
+            ));
+        }
+        let made = [table(&report), markdown(&report), csv(&report)];
+        if made.iter().any(String::is_empty) {
+            return Err("a table is empty".to_owned());
+        }
+        // What cannot be drawn may be refused.
+        drop(plots(&report));
+        Ok(())
     })
 }

@@ -267,6 +267,17 @@ pub fn profiles() -> Vec<Vec<u8>> {
     vec![NoiseProfile::from_fit(fit, 4).to_toml().into_bytes()]
 }
 
+/// Of the frames of [`json_poses`].
+pub fn points() -> Vec<Vec<u8>> {
+    let table = "frame,x_px,y_px,x_m,y_m,z_m\n# seen\n1,16.5,12.25,0.5,0.1,0.0\nf_002.png,10,8,0.2,-0.1,-1\n2,,,0.6,0,0.5\n";
+    vec![table.into()]
+}
+
+/// Of `mixray bench`.
+pub fn results() -> Vec<Vec<u8>> {
+    vec![include_bytes!("../data/results.json").to_vec()]
+}
+
 /// A textured triangle with everything that a model may have in short.
 pub fn models() -> Vec<Vec<u8>> {
     vec![model(&encoded(&picture(), ImageFormat::Png))]

@@ -14,7 +14,7 @@ use crate::bench::{
 use crate::cli::bench::command_line;
 use crate::cli::bench::conclusions::conclude;
 use crate::cli::bench::docs::Docs;
-use crate::cli::bench::files::{Gallery, read_report, write_figures, write_pictures};
+use crate::cli::bench::files::{Gallery, write_figures, write_pictures};
 use crate::cli::bench::flags::{
     OutputFlags, RaysFlag, RunFlags, finish, has_hardware_gpu, load_scenes, machine_of,
 };
@@ -23,7 +23,7 @@ use crate::cli::scene_flags::SceneFlags;
 use crate::cli::values::{above_zero, camera_noise, choice, rays_per_pixel};
 use crate::cli::{Failure, Outcome, interrupt, print, progress, say};
 use crate::renderer::{CameraNoise, SCRAMBLES, Skip, Watcher};
-use crate::scene::{BackendChoice, Choice, Estimator};
+use crate::scene::{BackendChoice, Choice, Estimator, Scene};
 
 use ablation::without_each;
 
@@ -111,6 +111,7 @@ pub(super) struct Job {
     docs: Option<Docs>,
     pub methods: Vec<Method>,
     pub camera_noise: Option<CameraNoise>,
+    scenes: Vec<Scene>,
     machine: Machine,
 }
 
@@ -139,12 +140,21 @@ impl Arguments {
         self.check_direct()?;
         self.check_goals()?;
         let docs = (self.output).start(if self.ablate { "ablate" } else { "bench" })?;
-        let earlier = self.against.as_deref().map(read_report).transpose()?;
+        let earlier = self.against.as_deref().map(Report::read).transpose()?;
+        let camera_noise = self.camera_noise.as_deref().map(camera_noise).transpose()?;
+        let mut scenes = load_scenes(&self.scenes, self.scene, self.runs.shrink)?;
+        // Asks for graphics devices, which may take seconds: after all that may be refused.
         let machine = match self.report {
             Some(_) => Machine::this(false),
             None => self.runs.machine(),
         };
-        let camera_noise = self.camera_noise.as_deref().map(camera_noise).transpose()?;
+        // References are made there.
+        for scene in &mut scenes {
+            scene.settings.backend = match has_hardware_gpu(&machine) {
+                true => BackendChoice::Gpu,
+                false => BackendChoice::Cpu,
+            };
+        }
         let methods = self.methods(&machine);
         let on_gpu = methods.iter().any(|m| m.backend == BackendChoice::Gpu);
         if self.no_skip.contains(&Skip::Specialisation) && !on_gpu {
@@ -157,6 +167,7 @@ impl Arguments {
             docs,
             methods,
             camera_noise,
+            scenes,
             machine,
         })
     }
@@ -183,7 +194,7 @@ pub(super) fn run(arguments: Arguments) -> Result<Outcome, Failure> {
     let arguments = &job.arguments;
     let (report, interrupted) = match &arguments.report {
         Some(path) => {
-            let mut report = read_report(path)?;
+            let mut report = Report::read(path)?;
             if arguments.target_rmse.is_some() {
                 conclude(&mut report, arguments.target_rmse);
             }
@@ -227,17 +238,7 @@ impl Job {
 fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
     let arguments = &job.arguments;
     let rays_per_pixel = arguments.rays.ascending();
-    // References are made there.
-    let backend = match has_hardware_gpu(&job.machine) {
-        true => BackendChoice::Gpu,
-        false => BackendChoice::Cpu,
-    };
-    let scenes = load_scenes(
-        &arguments.scenes,
-        arguments.scene,
-        arguments.runs.shrink,
-        backend,
-    )?;
+    let scenes = &job.scenes;
     let plots = scenes.iter().flat_map(|scene| {
         ["time.svg", "time.png", "rays.svg", "rays.png"]
             .map(|axis| format!("{}-error-{axis}", scene.name))
@@ -260,7 +261,7 @@ fn benchmark(job: &Job) -> Result<(Report, bool), Failure> {
         Some(path) => Source::Given(path.clone()),
         None => Source::Folder(folder.to_owned()),
     };
-    'scenes: for scene in &scenes {
+    'scenes: for scene in scenes {
         let mut truths = BTreeMap::new();
         for composite in &arguments.runs.composites {
             let found = reference(scene, *composite, &source, goal, &watcher, &mut |what| {

@@ -7,7 +7,9 @@ pub use profile::{
     WHITE, bin_index,
 };
 
+use crate::refusal::Refusal;
 use crate::scene::error::Result;
+use crate::scene::fingerprint::{content, content_by_name};
 use crate::scene::reader::{Choice, Table};
 use crate::stages::table::{StageSettings, read_into};
 
@@ -50,7 +52,7 @@ impl NoiseSettings {
     ///
     /// # Errors
     /// In one line: they are too large together.
-    pub fn check_textures(&self) -> std::result::Result<(), String> {
+    pub fn check_textures(&self) -> std::result::Result<(), Refusal> {
         let texels = u64::from(self.texture_size).pow(2) * self.profile.bins.len() as u64;
         if self.method == NoiseMethod::Textures && texels > Self::MAX_TEXELS {
             return Err(format!(
@@ -59,7 +61,7 @@ impl NoiseSettings {
                 self.texture_size,
                 self.texture_size,
                 Self::MAX_TEXELS
-            ));
+            ).into());
         }
         Ok(())
     }
@@ -77,6 +79,12 @@ impl NoiseSettings {
     }
 }
 
+content! {
+    NoiseSettings { profile, method, scale, texture_size, magnification, update_delay_frames, eight_bit }
+}
+
+content_by_name! { NoiseMethod }
+
 impl StageSettings for NoiseSettings {
     const KEYS: &'static [&'static str] = &[
         "profile",
@@ -91,7 +99,7 @@ impl StageSettings for NoiseSettings {
     fn read(table: &Table) -> Result<Self> {
         let profile = table.required("profile", "profile = \"noise.toml\"", |node| {
             let path = node.existing_file()?;
-            NoiseProfile::read(&path).map_err(|problem| node.file_error(&path, &problem))
+            NoiseProfile::read(&path).map_err(|problem| node.file_error(&path, problem))
         })?;
         let mut settings = NoiseSettings::new(profile);
         read_into(table, "method", &mut settings.method, |node| node.choice())?;

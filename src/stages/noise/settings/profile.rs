@@ -9,6 +9,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::decode::{MAX_TEXT_BYTES, read_text};
+use crate::refusal::Refusal;
+use crate::scene::fingerprint::content;
 
 /// Version of the file format that this program reads and writes.
 pub const NOISE_PROFILE_VERSION: i64 = 1;
@@ -72,6 +74,12 @@ impl NoiseFit {
     }
 }
 
+content! {
+    NoiseProfile { bins, autocorrelation, channel_correlation, fit; sources }
+    NoiseBin { mean, sigma, low, high, samples, filled }
+    NoiseFit { a, b }
+}
+
 impl NoiseProfile {
     /// White noise of variance a y + b in every channel, y being the middle of each of `bins` bins.
     pub fn from_fit(fit: NoiseFit, bins: usize) -> Self {
@@ -101,7 +109,7 @@ impl NoiseProfile {
     }
 
     /// Reads a profile file. An error reads "problem; expected ...; how to mend" and leaves out the path.
-    pub fn read(path: &Path) -> Result<Self, String> {
+    pub fn read(path: &Path) -> Result<Self, Refusal> {
         let text = read_text(path, MAX_TEXT_BYTES).map_err(|reason| {
             format!("it cannot be read ({reason}); expected a noise profile; correct the path")
         })?;
@@ -109,7 +117,7 @@ impl NoiseProfile {
     }
 
     /// The profile of a file's text; errors as [`NoiseProfile::read`].
-    pub fn from_toml(text: &str) -> Result<Self, String> {
+    pub fn from_toml(text: &str) -> Result<Self, Refusal> {
         let broken = |error: toml::de::Error| {
             format!(
                 "it is no noise profile ({}); expected a file of `mixray noise calibrate`; calibrate again",
@@ -121,13 +129,14 @@ impl NoiseProfile {
             return Err(format!(
                 "its format is \"{}\"; expected \"{FORMAT}\"; calibrate again",
                 head.format
-            ));
+            )
+            .into());
         }
         if head.version != NOISE_PROFILE_VERSION {
             return Err(format!(
                 "it is a noise profile of version {}; expected version {NOISE_PROFILE_VERSION}; calibrate again with this program",
                 head.version
-            ));
+            ).into());
         }
         let file: File = toml::from_str(text).map_err(broken)?;
         let profile = Self {
@@ -150,12 +159,13 @@ impl NoiseProfile {
 
     /// # Errors
     /// What no camera measures, in one line.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), Refusal> {
         let count = self.bins.len();
         if !count.is_power_of_two() || count > MAX_BINS {
             return Err(format!(
                 "it has {count} bins; expected a power of two, at most {MAX_BINS}; calibrate again"
-            ));
+            )
+            .into());
         }
         let sigmas = self.bins.iter().flat_map(|bin| bin.sigma);
         let means = self.bins.iter().flat_map(|bin| bin.mean);
@@ -163,8 +173,7 @@ impl NoiseProfile {
             || means.clone().any(|mean| !(mean.abs() <= 255.0))
         {
             return Err(
-                "a mean or sigma is no number from 0 to 255 DN; expected measured values; calibrate again, or give other numbers"
-                    .to_owned(),
+                "a mean or sigma is no number from 0 to 255 DN; expected measured values; calibrate again, or give other numbers".into(),
             );
         }
         let lags = self.autocorrelation.as_flattened().as_flattened();
@@ -173,7 +182,7 @@ impl NoiseProfile {
         if correlations.clone().any(|rho| !(rho.abs() <= 1.5)) {
             return Err(
                 "a correlation is not within -1 and 1; expected measured values; calibrate again"
-                    .to_owned(),
+                    .into(),
             );
         }
         Ok(())
@@ -297,78 +306,4 @@ impl From<BinTable> for NoiseBin {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn profile() -> NoiseProfile {
-        let mut profile = NoiseProfile::from_fit(NoiseFit { a: 0.02, b: 0.5 }, 4);
-        profile.autocorrelation[1][2][4] = 0.25;
-        profile.channel_correlation = [0.5, -0.125, 0.0];
-        profile.bins[2].filled[1] = true;
-        profile.bins[1].samples = [1, 2, 3_000_000_000];
-        for bin in &mut profile.bins {
-            // Values that six decimals hold.
-            bin.sigma = [1.5, 0.25, 2.0];
-            (bin.low, bin.high) = ([1.0; 3], [3.0; 3]);
-        }
-        profile.sources = vec!["a \"quoted\" folder\\with: 3 frames".into()];
-        profile
-    }
-
-    #[test]
-    fn the_file_survives_a_round_trip() {
-        let text = profile().to_toml();
-        assert_eq!(NoiseProfile::from_toml(&text).unwrap(), profile(), "{text}");
-        let changed = text.replace("sigma = [1.500000", "sigma = [1.500001");
-        assert_ne!(
-            NoiseProfile::from_toml(&changed).unwrap(),
-            profile(),
-            "control"
-        );
-    }
-
-    #[test]
-    fn other_files_are_refused_with_the_reason() {
-        let text = profile().to_toml();
-        for (from, to, part) in [
-            (
-                "version = 1",
-                "version = 2",
-                "version 2; expected version 1",
-            ),
-            (
-                "mixray noise profile\"",
-                "other\"",
-                "its format is \"other\"",
-            ),
-            ("sigma = [1.5", "sigma = [-1.5", "0 to 255 DN"),
-            ("sigma = [1.5", "sigma = [nan", "no noise profile"),
-            ("0.250000", "2.5", "within -1 and 1"),
-            ("[fit]", "[fits]", "no noise profile"),
-            ("filled", "full", "no noise profile"),
-        ] {
-            let message = NoiseProfile::from_toml(&text.replace(from, to)).unwrap_err();
-            assert!(message.contains(part), "{message}");
-        }
-        let three = text.rsplit_once("\n[[bin]]").unwrap().0;
-        assert!(
-            NoiseProfile::from_toml(three)
-                .unwrap_err()
-                .contains("3 bins")
-        );
-        assert!(
-            NoiseProfile::from_toml("a = 1")
-                .unwrap_err()
-                .contains("no noise profile")
-        );
-    }
-
-    #[test]
-    fn bins_are_those_that_the_paper_means() {
-        assert_eq!(
-            [0.0, 63.9, 64.0, 255.0, 300.0, -3.0].map(|c| bin_index(c, 4)),
-            [0, 0, 1, 3, 3, 0]
-        );
-        assert_eq!(bin_index(200.0, 1), 0);
-    }
-}
+mod tests;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Hit, Ray, WorldBvh};
+use crate::accel::{Hit, Ray, WorldBvh};
 use crate::bench::stress::backend::traced_by_shader;
 use crate::bench::stress::meshes::*;
 use crate::gpu::harness::test_device;
@@ -118,6 +118,34 @@ fn the_shader_handles_worlds_without_triangles() {
     agree("no virtual world", &mesh, &[], &rays);
     agree("no world", &[], &[], &rays);
     agree("one triangle", &mesh[..1], &mesh[1..2], &rays);
+}
+
+/// What moves is replaced under a tree that the shader knows, as part of a whole and alone.
+#[test]
+fn the_shader_hits_a_moving_part_as_if_all_were_one() {
+    let (rests, moves) = (soup(2000, 0.2, 9), soup(300, 0.3, 10));
+    let rays = rays_about(1.0, 4000, 11);
+    let real = WorldBvh::build(&rests, 0).expect("builds");
+    for resting in [&rests[..], &[]] {
+        let mut parts = WorldBvh::build(resting, 2000).expect("builds");
+        for moving in [&moves[..100], &[], &moves[..1], &moves[..]] {
+            parts.set_moving(moving).expect("builds");
+            let all = [resting, moving].concat();
+            let whole = WorldBvh::build(&all, 2000).expect("builds");
+            let traced = |world| shader_hits([&real, world], &rays, false);
+            let (Some(got), Some(expected)) = (traced(&parts), traced(&whole)) else {
+                return;
+            };
+            assert_eq!(got, expected);
+            let moved = |hit: &&Hit| hit.is_hit() && hit.triangle >= (2000 + resting.len()) as u32;
+            let moved = got.iter().filter(moved).count();
+            assert!(
+                (moved > 50) == (moving.len() > 50),
+                "{moved} of {}",
+                moving.len()
+            );
+        }
+    }
 }
 
 #[test]

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use wgpu::naga;
 
-use super::profile::KERNELS;
-use super::{Composer, Features, kernel::reflect_bindings};
+use crate::gpu::profile::KERNELS;
+use crate::gpu::{Composer, Features, kernel::reflect_bindings};
 
 /// Nothing on, everything on, each feature alone, all but each.
 fn variants() -> Vec<Features> {

@@ -1,3 +1,5 @@
+mod gpu;
+
 use glam::Vec3;
 
 use super::kernel::Kernel;
@@ -115,9 +117,9 @@ fn nothing_is_hit_without_triangles() {
         assert!(!world.any_by(kernel, &ray));
     }
     assert_eq!(world.bounds(), None);
-    assert_eq!(world.gpu_nodes().len(), 1);
-    assert!(world.gpu_leaves().is_empty());
-    assert!(world.bounding_spheres(4).is_empty());
+    assert!(!world.gpu_nodes()[0].is_empty());
+    assert!(world.gpu_leaves().concat().is_empty());
+    assert!(cover(&[], 4).is_empty());
 }
 
 #[test]
@@ -351,12 +353,14 @@ fn moved(triangles: &[[Vec3; 3]], by: Vec3) -> Vec<[Vec3; 3]> {
     triangles.iter().map(|t| t.map(|v| v + by)).collect()
 }
 
+fn cover(triangles: &[[Vec3; 3]], max: usize) -> Vec<[f32; 4]> {
+    Cover::spheres(&[&Cover::of(triangles, max)], max)
+}
+
 #[test]
 fn spheres_cover_tightly_and_are_few() {
     let ball = sphere(30, 60, 1.0);
-    let one = WorldBvh::build(&ball, 0)
-        .expect("builds")
-        .bounding_spheres(16);
+    let one = cover(&ball, 16);
     assert_eq!(one.len(), 1, "{one:?}");
     assert!(one[0][3] < 1.00001, "{one:?}");
     assert!(covered(&ball, &one));
@@ -365,21 +369,92 @@ fn spheres_cover_tightly_and_are_few() {
     let mut three = ball.clone();
     three.extend(moved(&ball, Vec3::new(10.0, 0.0, 0.0)));
     three.extend(moved(&ball, Vec3::new(0.0, 20.0, 5.0)));
-    let world = WorldBvh::build(&three, 0).expect("builds");
-    let cover = world.bounding_spheres(16);
-    assert_eq!(cover.len(), 3, "{cover:?}");
-    assert!(cover.iter().all(|s| s[3] < 1.00001), "{cover:?}");
+    let spheres = cover(&three, 16);
+    assert_eq!(spheres.len(), 3, "{spheres:?}");
+    assert!(spheres.iter().all(|s| s[3] < 1.00001), "{spheres:?}");
     for max in 0..5 {
-        let cover = world.bounding_spheres(max);
-        assert!(cover.len() <= max);
-        assert_eq!(covered(&three, &cover), max > 0);
+        let spheres = cover(&three, max);
+        assert!(spheres.len() <= max.max(1));
+        assert!(covered(&three, &spheres));
     }
 
     for (seed, scale) in [(1, 1e-4), (2, 1.0), (3, 1e6)] {
         let mesh = scaled(slivers(2000, seed, 1e-3), scale);
-        let cover = WorldBvh::build(&mesh, 0)
-            .expect("builds")
-            .bounding_spheres(16);
-        assert!(covered(&mesh, &cover), "{cover:?}");
+        let spheres = cover(&mesh, 16);
+        assert!(covered(&mesh, &spheres), "{spheres:?}");
     }
+}
+
+#[test]
+fn spheres_over_two_meshes_cover_both_and_are_shared_out_by_what_they_save() {
+    let rests = slivers(2000, 4, 1e-3);
+    let ball = moved(&sphere(30, 60, 1.0), Vec3::X * 50.0);
+    let covers = [Cover::of(&rests, 16), Cover::of(&ball, 16)];
+    let spheres = Cover::spheres(&[&covers[0], &covers[1]], 16);
+    assert!(covered(&rests, &spheres) && covered(&ball, &spheres));
+    assert!(spheres.len() <= 16);
+    // The ball needs but one; the rest is as it is alone with one less.
+    assert_eq!(spheres[..spheres.len() - 1], cover(&rests, 15));
+    assert!(!covered(&ball, &spheres[..spheres.len() - 1]), "control");
+}
+
+/// A world of two parts, and the same triangles as one.
+fn parted(resting: &[[Vec3; 3]], moving: &[[Vec3; 3]]) -> [WorldBvh; 2] {
+    let mut parts = WorldBvh::build(resting, 7).expect("builds");
+    // What moved before leaves nothing behind.
+    parts.set_moving(&soup(300, 0.5, 77)).expect("builds");
+    parts.set_moving(moving).expect("builds");
+    let whole = WorldBvh::build(&[resting, moving].concat(), 7).expect("builds");
+    [parts, whole]
+}
+
+#[test]
+fn a_moving_part_is_hit_as_if_all_were_one() {
+    let (rests, moves) = (soup(2000, 0.2, 21), soup(500, 0.3, 22));
+    let both = [&rests[..], &moves[..]].concat();
+    // The last moves exactly where it rested: the smaller id is hit.
+    for (resting, moving) in [
+        (&both[..2000], &both[2000..]),
+        (&both[..0], &both[..]),
+        (&both[..], &both[..0]),
+        (&both[..500], &both[..500]),
+    ] {
+        let [parts, whole] = parted(resting, moving);
+        assert_eq!(parts.bounds(), whole.bounds());
+        let mut random = Random(23);
+        let mut hits = [0; 2];
+        for _ in 0..3000 {
+            let ray = random_ray(&mut random, Vec3::ZERO, 1.0);
+            let expected = whole.closest(&ray);
+            for kernel in kernels() {
+                assert_eq!(parts.closest_by(kernel, &ray), expected, "{ray:?}");
+                assert_eq!(parts.any_by(kernel, &ray), expected.is_hit(), "{ray:?}");
+            }
+            if expected.is_hit() {
+                hits[usize::from(expected.triangle >= 7 + resting.len() as u32)] += 1;
+            }
+        }
+        let twice = resting == moving;
+        assert_eq!(hits[0] > 100, !resting.is_empty(), "{hits:?}");
+        assert_eq!(hits[1] > 100, !moving.is_empty() && !twice, "{hits:?}");
+    }
+}
+
+#[test]
+fn what_rests_is_not_built_again() {
+    let (rests, moves) = (soup(2000, 0.2, 24), soup(100, 0.3, 25));
+    let [mut parts, _] = parted(&rests, &moves);
+    let resting = |world: &WorldBvh| {
+        (
+            world.resting.wide.nodes.as_ptr(),
+            world.gpu_nodes()[1].as_ptr(),
+        )
+    };
+    let moving = |world: &WorldBvh| world.moving.as_ref().map(|tree| tree.wide.nodes.as_ptr());
+    let before = (resting(&parts), moving(&parts));
+    let kept = std::mem::take(&mut parts.moving);
+    parts.set_moving(&moved(&moves, Vec3::X)).expect("builds");
+    assert_eq!(resting(&parts), before.0);
+    assert_ne!(moving(&parts), before.1, "control");
+    drop(kept);
 }

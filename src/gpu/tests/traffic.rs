@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::kernel::reflect_bindings;
-use super::lanes::PARTS_GROUP;
-use super::profile::KERNELS;
-use super::{Composer, Features};
+use crate::gpu::kernel::reflect_bindings;
+use crate::gpu::lanes::PARTS_GROUP;
+use crate::gpu::profile::KERNELS;
+use crate::gpu::{Composer, Features};
 
-const DOC: &str = include_str!("../../docs/architecture.md");
+const DOC: &str = include_str!("../../../docs/architecture.md");
 const LANE: u32 = 4;
 
 /// Bytes of an element of each array of the state that a kernel binds, in the largest variant of an estimator.

@@ -6,9 +6,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use bytemuck::Zeroable;
 use glam::Vec3;
 
-use super::harness::test_device;
-use super::*;
+use super::{MIX, mix};
 use crate::film::{Film, Sample, guide_add};
+use crate::gpu::harness::test_device;
+use crate::gpu::*;
 use crate::packed::Frame;
 use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
 
@@ -47,19 +48,11 @@ fn answer(st: ptr<function, PathState>, thread: u32) {
     (*st).rays.mixed += 1u;
 }";
 
-const TOY: &str = "fn mix_bits(word: u32) -> u32 { var x = word; x ^= x >> 16u; x *= 0x7feb352du; return x ^ (x >> 15u); }";
-
 pub(super) fn composer() -> Composer {
     Composer::default()
         .with_module("cpu::estimator", ESTIMATOR)
         .with_module("cpu::request", REQUEST)
-        .with_module("toy", TOY)
-}
-
-fn mix(mut x: u32) -> u32 {
-    x ^= x >> 16;
-    x = x.wrapping_mul(0x7feb_352d);
-    x ^ (x >> 15)
+        .with_module("toy", MIX)
 }
 
 /// Twin of the toy: the sample, its rays, and the normal where there are any.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use wgpu::naga;
 
-use super::compose::{Composer, DECLARED, Features, item_name};
+use crate::gpu::compose::{Composer, DECLARED, Features, item_name};
 use crate::shared::{Module, Value};
 
 /// Bytes of an array's element; name, offset and size of the fields.
@@ -116,6 +116,11 @@ pub(crate) fn differences(composer: Composer, declared: &Module) -> Vec<&'static
         .iter()
         .filter(|record| {
             let fields = record.fields.iter();
+            if record.is_value {
+                let found = records.get(record.name);
+                let found = found.map(|(_, fields)| fields.iter().map(|field| field.0));
+                return !found.is_some_and(|names| names.eq(fields.map(|field| field.name)));
+            }
             let fields = fields.map(|field| (field.name, field.offset, field.size));
             records.get(record.name) != Some(&(record.size, fields.collect()))
         })
@@ -143,9 +148,9 @@ fn another_value_and_a_swapped_pair_of_fields_are_noticed() {
             "MAX_SPHERES",
         ),
         (
-            "    roughness: f32,\n    ior: f32,\n",
-            "    ior: f32,\n    roughness: f32,\n",
-            "Material",
+            "    kind: u32,\n    side: u32,\n",
+            "    side: u32,\n    kind: u32,\n",
+            "Light",
         ),
         ("    pad: vec2<u32>,\n", "", "Triangle"),
     ];
@@ -155,4 +160,17 @@ fn another_value_and_a_swapped_pair_of_fields_are_noticed() {
         let composer = Composer::default().with_module(records.path(), other);
         assert_eq!(differences(composer, records), [name]);
     }
+}
+
+#[test]
+fn a_swapped_pair_of_fields_of_a_value_is_noticed() {
+    let surface = &crate::material::surface::SHARED;
+    let text = surface.wgsl();
+    let (from, to) = (
+        "metallic: f32,\n    ggx_alpha",
+        "ggx_alpha: f32,\n    metallic",
+    );
+    assert!(text.contains(from), "{text}");
+    let composer = Composer::default().with_module(surface.path(), text.replacen(from, to, 1));
+    assert_eq!(differences(composer, surface), ["Surface"]);
 }

@@ -1,0 +1,109 @@
+//! What scattering at a [`Surface`] gives, and the directions that it is made of.
+
+use glam::Vec3;
+
+use super::normal::unit;
+use super::surface::Surface;
+use crate::math::{orthonormal_basis, sincos_2pi};
+use crate::shared::shared;
+
+shared! {
+    /// A mirrored or refracted direction that rounding put on the wrong side of the surface is lifted to this height.
+    const GRAZING_LIFT: f32 = 1e-4;
+
+    /// Non-delta lobes for one pair of directions.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub value struct BsdfEval {
+        /// BSDF times |cos| of `wi`, 1/sr.
+        pub f_cos: Vec3,
+        /// Solid-angle density with which [`bsdf_sample`](super::bsdf_sample) draws `wi`; integrates to 1 less the probability of delta lobes and of
+        /// samples that fall below the surface.
+        pub pdf: f32,
+    }
+
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub value struct BsdfSample {
+        /// Unit.
+        pub wi: Vec3,
+        /// f cos / pdf of the whole non-delta mixture, or of the delta lobe over its selection probability.
+        pub weight: Vec3,
+        /// Solid angle; 0 if `delta`.
+        pub pdf: f32,
+        pub delta: bool,
+        /// `wi` is on the other side of the surface.
+        pub transmitted: bool,
+        /// False: the path ends here.
+        pub valid: bool,
+    }
+}
+
+pub const EVAL_NOTHING: BsdfEval = BsdfEval {
+    f_cos: Vec3::ZERO,
+    pdf: 0.0,
+};
+
+pub const SAMPLE_NOTHING: BsdfSample = BsdfSample {
+    wi: Vec3::Z,
+    weight: Vec3::ZERO,
+    pdf: 0.0,
+    delta: false,
+    transmitted: false,
+    valid: false,
+};
+
+/// `v` mirrored at the plane of `normal`.
+pub fn mirrored_at(normal: Vec3, v: Vec3) -> Vec3 {
+    v - normal * (2.0 * v.dot(normal))
+}
+
+/// `wo` reflected about `h`.
+pub fn reflected_about(h: Vec3, wo: Vec3) -> Vec3 {
+    h * (2.0 * wo.dot(h)) - wo
+}
+
+/// `w`, lifted to the side of `ng` if `side` is 1, to the other if it is -1, where it is not there already.
+pub fn on_side(ng: Vec3, side: f32, w: Vec3) -> Vec3 {
+    let height = side * ng.dot(w);
+    if height > 0.0 {
+        w
+    } else {
+        unit(w + ng * (side * (GRAZING_LIFT - height)))
+    }
+}
+
+pub fn delta_sample(wi: Vec3, weight: Vec3, transmitted: bool) -> BsdfSample {
+    BsdfSample {
+        wi,
+        weight,
+        pdf: 0.0,
+        delta: true,
+        transmitted,
+        valid: true,
+    }
+}
+
+/// Cosine of Lambert's law for a shading normal that differs from the geometric one: directions of the shading hemisphere that lie
+/// under the surface are mirrored up at it, so that no energy is lost and a white Lambertian mesh reflects all light.
+pub fn lambert_cos(s: &Surface, wi: Vec3) -> f32 {
+    let height = s.ng.dot(wi);
+    if height <= 0.0 {
+        return 0.0;
+    }
+    let direct = s.ns.dot(wi);
+    let mirrored = direct - 2.0 * height * s.ng.dot(s.ns);
+    direct.max(0.0) + mirrored.max(0.0)
+}
+
+/// A direction about the shading normal by Lambert's law, mirrored up where it is under the surface.
+pub fn sample_lambert(s: &Surface, u0: f32, u1: f32) -> Vec3 {
+    let (tangent, bitangent) = orthonormal_basis(s.ns);
+    let (sin_phi, cos_phi) = sincos_2pi(u0);
+    let radius = u1.sqrt();
+    let z = (1.0 - u1).max(0.0).sqrt();
+    let w = unit(tangent * (radius * cos_phi) + bitangent * (radius * sin_phi) + s.ns * z);
+    if s.ng.dot(w) < 0.0 {
+        mirrored_at(s.ng, w)
+    } else {
+        w
+    }
+}

@@ -1,0 +1,103 @@
+use super::*;
+use crate::film::{Sample, guide_add, planes};
+use crate::output::film_note::tests::note;
+use crate::scene::{Camera, Composite, Estimator, SamplerKind};
+use glam::Vec3;
+
+fn film() -> Film {
+    let mut film = Film::new(3, 2, 7, true);
+    for pixel in 0..5 {
+        for index in 0..40 {
+            let x = ((pixel * 97 + index * 31) as f32 * 0.37).sin();
+            let bad = pixel == 2 && index == 9;
+            let sample = Sample {
+                is_virtual: (pixel + index) % 3 == 0,
+                contribution: Vec3::new(x, if bad { f32::NAN } else { x * 1e-7 }, x * 1e9),
+                real: Some(Vec3::splat(x.abs())),
+            };
+            film.add(pixel as usize, &sample);
+            if index % 4 > 0 {
+                let normal = Vec3::new(x, 0.3, 0.1);
+                let guide = &mut film.guides[pixel as usize];
+                guide_add(guide, 1.0 + x.abs(), normal, Vec3::splat(x.abs()));
+            }
+        }
+    }
+    film
+}
+
+fn written(film: &Film) -> (tempfile::TempDir, Target) {
+    let folder = tempfile::tempdir().unwrap();
+    let target = Target::picture(&folder.path().join("a.exr")).unwrap();
+    let picture = crate::film::composite(film, None, Composite::Additive);
+    let metadata = Metadata {
+        rays_per_pixel: 40,
+        max_bounces: 3,
+        seed: 1,
+        estimator: Estimator::Paper,
+        sampler: SamplerKind::Cmj,
+        scrambles: None,
+        filtered: false,
+        camera: Camera {
+            width: 3,
+            height: 2,
+            fx: 1.0,
+            fy: 1.0,
+            cx: 1.5,
+            cy: 1.0,
+            distortion: [0.0; 5],
+            world_from_camera: glam::DMat4::IDENTITY,
+        },
+    };
+    write_film(
+        &target,
+        &picture,
+        &planes(film, None),
+        &metadata,
+        film,
+        &note(),
+    )
+    .unwrap();
+    (folder, target)
+}
+
+#[test]
+fn a_film_survives_its_file_bit_for_bit() {
+    let film = film();
+    let (_folder, target) = written(&film);
+    let (read, read_note) = read_film(target.path()).unwrap();
+    assert_eq!(read, film);
+    assert_eq!(read_note, note());
+    assert_eq!(film.non_finite_samples(), 1, "control: every field is used");
+
+    let mut plain = film.clone();
+    plain.guides.clear();
+    let (_folder, target) = written(&plain);
+    assert_eq!(read_film(target.path()).unwrap().0, plain);
+}
+
+#[test]
+fn sums_that_are_not_finite_are_refused() {
+    type Damage = fn(&mut Film);
+    let damages: [(&str, Damage); 4] = [
+        ("sums.m_im.hi.G of pixel (1, 1) is NaN", |f| {
+            f.pixels[4].m_im.hi[1] = f32::NAN
+        }),
+        ("sums.sq.lo.B of pixel (2, 0) is inf", |f| {
+            f.pixels[2].sq.lo[2] = f32::INFINITY
+        }),
+        ("sums.r_ir.hi.R of pixel (0, 0) is -inf", |f| {
+            f.pixels[0].r_ir.hi[0] = f32::NEG_INFINITY
+        }),
+        ("sums.depth.hi.Z of pixel (0, 1) is NaN", |f| {
+            f.guides[3].depth_hi = f32::NAN
+        }),
+    ];
+    for (part, damage) in damages {
+        let mut film = film();
+        damage(&mut film);
+        let (_folder, target) = written(&film);
+        let message = read_film(target.path()).unwrap_err().to_string();
+        assert!(message.contains(part), "{message}");
+    }
+}

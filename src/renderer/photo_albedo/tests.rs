@@ -1,0 +1,108 @@
+use super::*;
+use crate::pack::{test_mesh, test_scene};
+use crate::scene::{
+    EncodedPhoto, Environment, EnvironmentMap, Light, LightKind, Material, Object, Scene, Side,
+};
+use crate::work::Watcher;
+
+/// A square that faces the camera from 1 m, with corners at x = `from` and x = `to`.
+fn wall(from: f32, to: f32) -> Object {
+    let corners = [
+        [from, -0.5, -1.0],
+        [to, -0.5, -1.0],
+        [to, 0.5, -1.0],
+        [from, 0.5, -1.0],
+    ];
+    let mut wall = test_mesh(
+        Side::Real,
+        &corners,
+        &[[0, 1, 2], [0, 2, 3]],
+        Material::default(),
+    );
+    wall.albedo_from_photo = true;
+    wall
+}
+
+/// In a white furnace without bounces a surface shows its albedo. Two walls share the view, one a quarter and one three quarters of it,
+/// and reach beyond it; a third is behind the camera.
+fn scene() -> (Scene, Photo) {
+    let mut scene = test_scene();
+    let camera = &mut scene.camera;
+    (camera.width, camera.height) = (32, 32);
+    (camera.fx, camera.fy, camera.cx, camera.cy) = (32.0, 32.0, 16.0, 16.0);
+    scene.settings.max_bounces = 1;
+    scene.environment = Some(Environment {
+        map: EnvironmentMap::Constant([1.0; 3]),
+        rotation_deg: 0.0,
+        scale: 1.0,
+    });
+    let mut behind = wall(-0.5, 0.5);
+    behind.world_from_object = glam::DMat4::from_translation(glam::DVec3::Z * 5.0);
+    scene.objects = vec![wall(-2.0, -0.25), wall(-0.25, 2.0), behind];
+    let linear = (0..32 * 32)
+        .map(|i| {
+            if i % 32 < 8 {
+                [0.8, 0.2, 0.1]
+            } else {
+                [0.1, 0.2, 0.6]
+            }
+        })
+        .collect();
+    let photo = Photo {
+        width: 32,
+        height: 32,
+        linear,
+        encoded: EncodedPhoto::Linear,
+    };
+    (scene, photo)
+}
+
+fn close(found: &[f32; 4], expected: [f32; 3]) -> bool {
+    (0..3).all(|c| (found[c] - expected[c]).abs() < 0.01)
+}
+
+/// Whichever came first, the savings to do without or the estimate.
+#[test]
+fn savings_left_out_do_not_change_the_estimate() {
+    let (mut scene, photo) = scene();
+    scene.environment = None;
+    scene.lights = vec![Light {
+        side: Side::Real,
+        kind: LightKind::Quad {
+            corner: [-0.5, -0.5, 0.5],
+            edge_u: [0.0, 1.0, 0.0],
+            edge_v: [1.0, 0.0, 0.0],
+            radiance: [4.0; 3],
+        },
+    }];
+    let estimate = |flags: u32| {
+        let mut packed = PackedScene::build(&scene, &Watcher::none()).expect("packs");
+        packed.frame.flags |= flags;
+        estimate_photo_albedo(&mut packed, &photo, &Watcher::none());
+        assert_eq!(packed.frame.flags & flags, flags, "the renders keep theirs");
+        let seen: f32 = (0..64)
+            .map(|i| render_first_hit(&packed, 16 * 33, i).0.x)
+            .sum();
+        (seen, packed.photo_albedo)
+    };
+    let (with, without) = (estimate(0), estimate(FRAME_NO_LAST_VERTEX));
+    assert!(with.0 > 0.0);
+    assert_ne!(with.0, without.0, "control: other samples");
+    assert_eq!(with.1, without.1);
+}
+
+#[test]
+fn each_object_has_the_median_of_its_own_pixels() {
+    let (scene, photo) = scene();
+    let mut packed = PackedScene::build(&scene, &Watcher::none()).expect("packs");
+    estimate_photo_albedo(&mut packed, &photo, &Watcher::none());
+    let of_objects = &packed.photo_albedo[32 * 32..];
+    let (red, blue) = ([0.8, 0.2, 0.1], [0.1, 0.2, 0.6]);
+    assert_eq!(of_objects.len(), 3);
+    assert!(close(&of_objects[0], red), "{of_objects:?}");
+    assert!(close(&of_objects[1], blue), "{of_objects:?}");
+    // Seen by no pixel: what most of the picture shows.
+    assert!(close(&of_objects[2], blue), "{of_objects:?}");
+    // Negative control.
+    assert!(!close(&of_objects[0], blue));
+}
