@@ -59,6 +59,11 @@ fn bsdf_passes_straight(s: Surface) -> bool {
     return thin_walled(s) || surface_index(s).eta2_minus_1 == 0.0;
 }
 
+fn bsdf_index_ratio(s: Surface) -> f32 {
+    if thin_walled(s) { return 1.0; }
+    return surface_index(s).eta;
+}
+
 fn bsdf_is_lambertian(s: Surface) -> bool {
     return (s.flags & MATERIAL_LAMBERTIAN) != 0u;
 }

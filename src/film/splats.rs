@@ -115,3 +115,6 @@ fn add(sum: &mut Sum3, x: DVec3) {
         (sum.hi[c], sum.lo[c]) = sum_add(sum.hi[c], sum.lo[c], low);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -76,6 +76,15 @@ pub fn bsdf_passes_straight(s: &Surface) -> bool {
     thin_walled(s) || surface_index(s).eta2_minus_1 == 0.0
 }
 
+/// Index of the volume beyond the surface over that on the side of the ray.
+pub fn bsdf_index_ratio(s: &Surface) -> f32 {
+    if thin_walled(s) {
+        1.0
+    } else {
+        surface_index(s).eta
+    }
+}
+
 /// f = base colour / pi, whatever the directions.
 pub fn bsdf_is_lambertian(s: &Surface) -> bool {
     s.flags & MATERIAL_LAMBERTIAN != 0

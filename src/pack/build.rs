@@ -6,7 +6,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use super::camera::frame_camera;
 use super::lights::pack_lights;
-use super::photons::TracedEnvironment;
+use super::photons::traced_environment;
 use crate::accel::{AccelError, Cover, WorldBvh};
 use crate::light::environment_table::environment_table;
 use crate::packed::materials::{MaterialKey, MaterialTable};
@@ -210,7 +210,7 @@ impl PackedScene {
                 self.frame.env_height = *height;
                 self.frame.env_radiance = [scale, scale, scale, table.normaliser];
                 self.env_mean_luminance = table.mean_luminance * environment.scale;
-                self.env_traced = TracedEnvironment::of_map(
+                self.env_traced = traced_environment(
                     *width,
                     *height,
                     &self.env_texels,

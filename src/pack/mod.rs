@@ -13,7 +13,6 @@ mod tests;
 pub use build::{PackError, next_anchor};
 #[cfg(feature = "bench")]
 pub(crate) use lights::FEW_LIGHTS;
-pub use photons::TracedEnvironment;
 pub use shutter::{Instant, instants, row_ends, traced_shutter};
 #[cfg(test)]
 pub use test_support::{test_mesh, test_scene};

@@ -8,7 +8,7 @@ use crate::math::luminance;
 use crate::packed::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, Light, MATERIAL_LAMBERTIAN,
     MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
-    MAX_PHOTON_SPHERES, Material, NONE, PackedScene, xyz,
+    MAX_PHOTON_SPHERES, Material, NONE, PackedScene, TracedEnvironment, xyz,
 };
 
 /// Light of the environment brighter than so many times its mean is sent as photons: the sun, lamps and windows. The eye's paths find the rest
@@ -134,31 +134,26 @@ fn least_green(packed: &PackedScene, texture: u32) -> f32 {
     f32::from(least.unwrap_or(255)) / 255.0
 }
 
-/// The part of the environment that photons bring.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct TracedEnvironment {
-    /// Luminance.
-    pub above: f64,
-    /// Luminance of what lies above it, mean over the sphere.
-    pub mean_radiance: f64,
-}
-
-impl TracedEnvironment {
-    /// Of a map of three floats a texel, scaled; `mean`: its luminance over the sphere.
-    pub fn of_map(width: u32, height: u32, texels: &[f32], scale: f64, mean: f64) -> Self {
-        let above = TRACED_ABOVE_MEAN * mean;
-        let (mut sum, mut area) = (0.0, 0.0);
-        for (row, texels) in texels.chunks(3 * width as usize).enumerate() {
-            let middle = (row as f64 + 0.5) / f64::from(height) * std::f64::consts::PI;
-            for texel in texels.chunks(3) {
-                let brightness = f64::from(luminance(Vec3::from_slice(texel))) * scale;
-                sum += (brightness - above).max(0.0) * middle.sin();
-                area += middle.sin();
-            }
+/// What photons bring of a map of three floats a texel, scaled; `mean`: its luminance over the sphere.
+pub(super) fn traced_environment(
+    width: u32,
+    height: u32,
+    texels: &[f32],
+    scale: f64,
+    mean: f64,
+) -> TracedEnvironment {
+    let above = TRACED_ABOVE_MEAN * mean;
+    let (mut sum, mut area) = (0.0, 0.0);
+    for (row, texels) in texels.chunks(3 * width as usize).enumerate() {
+        let middle = (row as f64 + 0.5) / f64::from(height) * std::f64::consts::PI;
+        for texel in texels.chunks(3) {
+            let brightness = f64::from(luminance(Vec3::from_slice(texel))) * scale;
+            sum += (brightness - above).max(0.0) * middle.sin();
+            area += middle.sin();
         }
-        Self {
-            above,
-            mean_radiance: sum / area.max(1e-30),
-        }
+    }
+    TracedEnvironment {
+        above,
+        mean_radiance: sum / area.max(1e-30),
     }
 }

@@ -10,7 +10,6 @@ pub use materials::Material;
 pub use records::*;
 
 use crate::accel::{Cover, WorldBvh};
-use crate::pack::TracedEnvironment;
 pub use crate::shared::NONE;
 
 /// What a backend renders.
@@ -52,6 +51,15 @@ pub struct PackedScene {
     pub(crate) env_traced: TracedEnvironment,
     /// Photons traced for every ray per pixel; 0 where none are.
     pub photons_per_ray: u64,
+}
+
+/// The part of the environment that photons bring.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TracedEnvironment {
+    /// Luminance.
+    pub above: f64,
+    /// Luminance of what lies above it, mean over the sphere.
+    pub mean_radiance: f64,
 }
 
 /// How many of a scene's triangles and vertices rest: those of animated virtual objects come after them.

