@@ -18,6 +18,10 @@ use crate::scene::trajectory::{EntryKey, FrameName, KnownPoint, Trajectory};
 use crate::scene::{Camera, Lens};
 use crate::video::FrameSource;
 
+/// Largest number in a table of points, metres or pixels: beyond, nothing can be told from the other side of the picture.
+const LARGEST: f64 = 1e12;
+/// No lens shows what is seen so far from the picture's corner.
+const FARTHEST_PX: f64 = 1e9;
 /// Frames with the largest errors that are named.
 const NAMED: usize = 5;
 
@@ -107,7 +111,8 @@ pub fn check_poses(
             world_from_camera: pose,
             ..camera
         };
-        let Some(projected) = project(&camera, point.world) else {
+        let in_reach = |seen: &DVec3| seen.truncate().abs().max_element() <= FARTHEST_PX;
+        let Some(projected) = project(&camera, point.world).filter(in_reach) else {
             behind += 1;
             continue;
         };
@@ -232,14 +237,22 @@ fn read_points(path: &Path) -> Result<Vec<KnownPoint>, SequenceError> {
             ));
         };
         let number = |word: &str| match word.parse::<f64>() {
-            Ok(x) if x.is_finite() => Ok(x),
+            Ok(x) if x.abs() <= LARGEST => Ok(x),
             _ => Err(failure(
                 line,
                 format!(
-                    "\"{word}\" is no finite number; expected frame,x_px,y_px,x_m,y_m,z_m; correct the line"
+                    "{word:?} is no number from -1e12 to 1e12; expected frame,x_px,y_px,x_m,y_m,z_m; correct the line"
                 ),
             )),
         };
+        if frame.contains(char::is_control) {
+            return Err(failure(
+                line,
+                format!(
+                    "{frame:?} names no frame; expected its number or the name of its file; correct the line"
+                ),
+            ));
+        }
         let seen = match (x_px.is_empty(), y_px.is_empty()) {
             (true, true) => None,
             _ => Some([number(x_px)?, number(y_px)?]),

@@ -133,8 +133,8 @@ const TRACES: &[Trace] = &[
     Trace {
         feature: "transmission",
         with: &[
-            "fn material_bsdf__eval_transmission",
-            "fn material_bsdf__transmit_straight",
+            "fn material_lobes__eval_transmission",
+            "fn material_lobes__transmit_straight",
             "fn material_ggx__ggx_refract",
             "fn material_fresnel__refract_about",
         ],
@@ -143,7 +143,7 @@ const TRACES: &[Trace] = &[
     },
     Trace {
         feature: "clearcoat",
-        with: &["fn material_bsdf__sample_coat"],
+        with: &["fn material_lobes__sample_coat"],
         beside: &["rough_specular"],
         ..ADVANCE
     },
@@ -251,8 +251,8 @@ const TRACES: &[Trace] = &[
         feature: "rough_specular",
         with: &[
             "fn material_ggx__",
-            "fn material_bsdf__sample_layers",
-            "fn material_bsdf__eval_reflection",
+            "fn material_lobes__lobes_sample",
+            "fn material_lobes__eval_reflection",
             "fn material_normal__valid_shading_normal",
         ],
         ..ADVANCE

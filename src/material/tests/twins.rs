@@ -342,7 +342,7 @@ import package::accel::trace::Hit;
                 "material_fresnel__refract_about",
             ],
         ),
-        ("clearcoat", &["material_bsdf__sample_coat"]),
+        ("clearcoat", &["material_lobes__sample_coat"]),
         (
             "rough_specular",
             &[

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mixray::bench::{Report, against, csv, markdown, plots, text as table};
+use mixray::bench::{Report, against, csv, markdown, text as table};
 use mixray::output::{ChannelFile, read_film};
 use mixray::scene::gltf::load_gltf;
 use mixray::scene::trajectory::{Trajectory, read_intrinsics};
@@ -264,8 +264,6 @@ fn results(path: &Path) -> Outcome {
         if made.iter().any(String::is_empty) {
             return Err("a table is empty".to_owned());
         }
-        // What cannot be drawn may be refused.
-        drop(plots(&report));
         Ok(())
     })
 }

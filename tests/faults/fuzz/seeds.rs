@@ -269,7 +269,7 @@ pub fn profiles() -> Vec<Vec<u8>> {
 
 /// Of the frames of [`json_poses`].
 pub fn points() -> Vec<Vec<u8>> {
-    let table = "frame,x_px,y_px,x_m,y_m,z_m\n# seen\n1,16.5,12.25,0.5,0.1,0.0\nf_002.png,10,8,0.2,-0.1,-1\n2,,,0.6,0,0.5\n";
+    let table = "frame,x_px,y_px,x_m,y_m,z_m\n# seen\nf_001.png,16.5,12.25,0.5,0.1,0.0\nf_002.png,10,8,0.2,-0.1,-1\nf_002.png,,,0.6,0,0.5\n";
     vec![table.into()]
 }
 

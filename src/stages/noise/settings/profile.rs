@@ -127,7 +127,7 @@ impl NoiseProfile {
         let head: Head = toml::from_str(text).map_err(broken)?;
         if head.format != FORMAT {
             return Err(format!(
-                "its format is \"{}\"; expected \"{FORMAT}\"; calibrate again",
+                "its format is {:?}; expected \"{FORMAT}\"; calibrate again",
                 head.format
             )
             .into());

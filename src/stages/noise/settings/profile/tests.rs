@@ -41,6 +41,11 @@ fn other_files_are_refused_with_the_reason() {
             "other\"",
             "its format is \"other\"",
         ),
+        (
+            "mixray noise profile\"",
+            "of two\\nlines\"",
+            "its format is \"of two\\nlines\"",
+        ),
         ("sigma = [1.5", "sigma = [-1.5", "0 to 255 DN"),
         ("sigma = [1.5", "sigma = [nan", "no noise profile"),
         ("0.250000", "2.5", "within -1 and 1"),
