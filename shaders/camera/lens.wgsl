@@ -4,7 +4,7 @@ import package::gpu::buffers::frame;
 import package::packed::records::{APERTURE_DISC, APERTURE_SQUARE};
 import package::math::{INV_TAU, dot3, normalize3, sincos_2pi};
 import package::camera::shutter::{CameraPose, camera_pose};
-import package::distortion::{distort, undistort_fast};
+import package::distortion::{distort, distortion_area, undistort_fast};
 
 fn sample_lens(u: f32, v: f32) -> vec2<f32> {
     let radius = frame.aperture_radius;
@@ -88,22 +88,11 @@ fn lens_undistort(xd: f32, yd: f32) -> vec2<f32> {
     return undistort_fast(coefficients(), vec2<f32>(xd, yd));
 }
 
+fn lens_area(x: f32, y: f32) -> f32 {
+    return distortion_area(coefficients(), vec2<f32>(x, y));
+}
+
 fn coefficients() -> array<f32, 5> {
     let k = frame.distortion;
     return array<f32, 5>(k.x, k.y, k.z, k.w, frame.distortion_k3);
-}
-
-fn lens_area(x: f32, y: f32) -> f32 {
-    let k1 = frame.distortion.x;
-    let k2 = frame.distortion.y;
-    let p1 = frame.distortion.z;
-    let p2 = frame.distortion.w;
-    let k3 = frame.distortion_k3;
-    let r2 = x * x + y * y;
-    let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    let slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
-    let xx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x;
-    let xy = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
-    let yy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
-    return abs(xx * yy - xy * xy);
 }

@@ -180,8 +180,10 @@ fn resume(st: ptr<function, PathState>) {
             (*st).path.pending &= ~PENDING_NEXT;
             follow(st, path_nexts[lane]);
             if (*st).path.mode == MODE_DIFFERENCE {
-                let smooth_ = ((*st).path.events & EVENT_AT_POLISHED) != 0u;
-                (*st).path.events = events_after((*st).path.events, (*st).ray.depth, (*st).ray.side, smooth_);
+                @if(photons) {
+                    let smooth_ = ((*st).path.events & EVENT_AT_POLISHED) != 0u;
+                    (*st).path.events = events_after((*st).path.events, (*st).ray.depth, (*st).ray.side, smooth_);
+                }
                 (*st).path.stage = STAGE_DIFFERENCE_CONE;
                 (*st).ray.request = REQUEST_VIRTUAL_THEN_REAL;
             } else {

@@ -64,7 +64,9 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     }
     stand_at(st, s, distance);
 
-    if difference && bsdf_is_polished(s) { (*st).path.events |= EVENT_AT_POLISHED; }
+    @if(photons) {
+        if difference && bsdf_is_polished(s) { (*st).path.events |= EVENT_AT_POLISHED; }
+    }
     // Those of a path are played for certain.
     var techniques = Techniques(0.0, 1.0);
     @if(!paper) {
@@ -256,9 +258,11 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
     let b = bsdf_sample(s, wo, vec3<f32>(lobe, pair(u)));
     if !b.valid { return; }
     var events = (*st).path.events;
-    if !(b.delta && b.transmitted && bsdf_passes_straight(s)) {
-        let smooth_ = b.delta || bsdf_is_polished(s);
-        events = events_after(events, (*st).ray.depth, (*st).ray.side, smooth_);
+    @if(photons) {
+        if !(b.delta && b.transmitted && bsdf_passes_straight(s)) {
+            let smooth_ = b.delta || bsdf_is_polished(s);
+            events = events_after(events, (*st).ray.depth, (*st).ray.side, smooth_);
+        }
     }
     var segment = Segment(
         b.wi,

@@ -29,7 +29,7 @@ pub enum MergeError {
     Size(u32, u32, u32, u32),
     #[error("one film has depth, normal and albedo planes, the other has none")]
     Guides,
-    #[error("they were planned for other numbers of photons; render both alike")]
+    #[error("one film has photons, the other has none; render both alike")]
     Photons,
     #[error(
         "they were planned differently at pixel {0}: with another --no-skip, or by another kind of machine; render both alike"
@@ -198,14 +198,6 @@ impl Film {
             merged.merge(self)?;
             *self = merged;
             return Ok(());
-        }
-        // As many photons for each ray.
-        let mut rays = self.pixels.iter().zip(&other.pixels);
-        if let Some((a, b)) = rays.find(|(a, b)| a.n > 0 && b.n > 0)
-            && u128::from(self.photons()) * u128::from(b.n)
-                != u128::from(other.photons()) * u128::from(a.n)
-        {
-            return Err(MergeError::Photons);
         }
         for (pixel, (a, b)) in self.pixels.iter().zip(&other.pixels).enumerate() {
             // A pixel without samples in both films is skipped in the whole render.

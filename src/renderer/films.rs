@@ -34,10 +34,6 @@ impl Renderer {
         for (info, sums) in renderer.core.packed.pixels.iter_mut().zip(&film.pixels) {
             info.sample_factor = sums.sample_factor.max(1);
         }
-        let rays = u64::from(end - film.first_sample);
-        if !film.splats.is_empty() {
-            renderer.core.packed.photons_per_ray = film.photons() / rays;
-        }
         renderer.core.film = film;
         renderer.driver.replay_real(&mut renderer.core)?;
         Ok(renderer)

@@ -329,7 +329,7 @@ fn photons_bring_what_the_eye_finds(backend: BackendChoice) {
         (CEILING, GLASS_FRONT, 3),
         (CEILING, &[PANE, MIRROR_BALL].concat(), 4),
         (CEILING, COATED_BALL, 3),
-        (GLOWING, POLISHED_BALL, 3),
+        (&[CEILING, GLOWING].concat(), POLISHED_BALL, 3),
     ] {
         let scene = smooth_under(lights, objects, max_bounces);
         let pair = pair(&scene, backend, Skip::Photons, None, 128);

@@ -129,6 +129,11 @@ const OTHER_ARGUMENTS: &[(&str, &str, &str)] = &[
     ),
     ("cpu::estimator", "begin_sample", "likewise"),
     (
+        "cpu::photons::path",
+        "trace_photon",
+        "a shader lists splats itself",
+    ),
+    (
         "film::sums",
         "two_sum sum_add sum3_add pixel_add pixel_add_real guide_add",
         "`zero` hides intermediate sums from shader compilers",

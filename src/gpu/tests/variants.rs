@@ -248,6 +248,15 @@ const TRACES: &[Trace] = &[
         ..ADVANCE
     },
     Trace {
+        feature: "photons",
+        with: &[
+            "fn cpu_contribution__left_to_photons",
+            "fn cpu_contribution__events_after",
+            "fn cpu_vertex__light_left_to_eye",
+        ],
+        ..ADVANCE
+    },
+    Trace {
         feature: "rough_specular",
         with: &[
             "fn material_ggx__",
