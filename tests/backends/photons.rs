@@ -10,9 +10,9 @@ use mixray::work::PhotonWork;
 use super::agreement::{backend_for, empty_film, load, renderer};
 use super::scenes::CASES;
 
-/// About as many as there are pixels, some past the first.
+/// Several a pixel, some past the first.
 const FIRST: u64 = 1000;
-const PHOTONS: u64 = 3000;
+const PHOTONS: u64 = 8000;
 const RELATIVE: f64 = 1e-4;
 /// Of a photon's usual splat, in steps of the sums.
 const ABSOLUTE: f64 = 64.0;
@@ -92,5 +92,5 @@ fn photons_are_the_same_on_both_backends() {
         assert!(control > 0, "control: one photon is noticed");
     }
     assert!(kinds >= 4, "{kinds} scenes trace photons");
-    assert!(lit_in_all > 200, "{lit_in_all} lit pixels");
+    assert!(lit_in_all > 150, "{lit_in_all} lit pixels");
 }
