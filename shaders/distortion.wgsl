@@ -24,6 +24,11 @@ fn jacobian(k: array<f32, 5>, ideal: vec2<f32>) -> vec3<f32> {
     );
 }
 
+fn distortion_area(k: array<f32, 5>, ideal: vec2<f32>) -> f32 {
+    let j = jacobian(k, ideal);
+    return abs(j.x * j.z - j.y * j.y);
+}
+
 fn undistort_fast(k: array<f32, 5>, distorted: vec2<f32>) -> vec2<f32> {
     if k[0] == 0.0 && k[1] == 0.0 && k[2] == 0.0 && k[3] == 0.0 && k[4] == 0.0 {
         return distorted;

@@ -51,6 +51,12 @@ fn jacobian<T: Real>(k: &Coefficients<T>, ideal: [T; 2]) -> [T; 3] {
     ]
 }
 
+/// How much larger a small area is in distorted coordinates than in ideal ones.
+pub fn distortion_area(k: &Coefficients<f32>, ideal: [f32; 2]) -> f32 {
+    let [xx, xy, yy] = jacobian(k, ideal);
+    (xx * yy - xy * xy).abs()
+}
+
 /// The ideal point of a distorted one as a backend finds it; the argument itself where there is no distortion.
 pub fn undistort_fast(k: &Coefficients<f32>, distorted: [f32; 2]) -> [f32; 2] {
     if k.iter().all(|&c| c == 0.0) {

@@ -4,7 +4,7 @@ import package::gpu::buffers::frame;
 import package::packed::records::{APERTURE_DISC, APERTURE_SQUARE};
 import package::math::{INV_TAU, dot3, normalize3, sincos_2pi};
 import package::camera::shutter::{CameraPose, camera_pose};
-import package::distortion::{distort, undistort_fast};
+import package::distortion::{distort, distortion_area, undistort_fast};
 
 fn sample_lens(u: f32, v: f32) -> vec2<f32> {
     let radius = frame.aperture_radius;
@@ -86,6 +86,10 @@ fn lens_distort(x: f32, y: f32) -> vec2<f32> {
 
 fn lens_undistort(xd: f32, yd: f32) -> vec2<f32> {
     return undistort_fast(coefficients(), vec2<f32>(xd, yd));
+}
+
+fn lens_area(x: f32, y: f32) -> f32 {
+    return distortion_area(coefficients(), vec2<f32>(x, y));
 }
 
 fn coefficients() -> array<f32, 5> {

@@ -2,8 +2,11 @@
 
 import package::gpu::buffers::{frame, pixels};
 import package::camera::sampler::{SampleKey, SampleSet, sample_set};
+import package::packed::records::{FRAME_NO_PHOTONS, SIDE_VIRTUAL};
+import package::material::bsdf::bsdf_is_polished;
+import package::material::surface::Surface;
 import package::cpu::state::{
-    DELTA_DENSITY, MODE_REAL, MODE_SHARED, PathState, path_radiances_real, path_results,
+    DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_REAL_CHAIN, EVENT_SCATTERED, EVENT_SEEN, EVENT_VIRTUAL_CHAIN, MODE_MIXED, MODE_REAL, MODE_SHARED, PathState, path_radiances_real, path_results,
 };
 
 fn draw(st: ptr<function, PathState>, purpose: u32) -> SampleSet {
@@ -17,7 +20,7 @@ fn sample_key(st: ptr<function, PathState>) -> SampleKey {
 
 fn accumulate(st: ptr<function, PathState>, unclamped: vec3<f32>) {
     var light = unclamped;
-    if (*st).path.indirect != 0u {
+    if ((*st).path.events & EVENT_SCATTERED) != 0u {
         let limit = frame.clamp_indirect * (*st).path.weight;
         let largest = max(max(abs(light.x), abs(light.y)), abs(light.z));
         if largest > limit { light *= limit / largest; }
@@ -28,6 +31,38 @@ fn accumulate(st: ptr<function, PathState>, unclamped: vec3<f32>) {
     }
     @if(!paper) {
         path_results[(*st).lane].radiance += light;
+    }
+}
+
+fn events_after(events: u32, depth: u32, side: u32, smooth_: bool) -> u32 {
+    if !smooth_ {
+        return (events & (EVENT_SEEN | EVENT_SCATTERED)) | select(0u, EVENT_SEEN, depth == 1u);
+    }
+    let before = select(events & ~EVENT_AT_POLISHED, events & EVENT_SCATTERED, depth == 1u);
+    return before | select(EVENT_REAL_CHAIN, EVENT_VIRTUAL_CHAIN, side == SIDE_VIRTUAL);
+}
+
+fn left_to_photons(st: ptr<function, PathState>) -> bool {
+    let chain = EVENT_SEEN | EVENT_VIRTUAL_CHAIN | EVENT_REAL_CHAIN;
+    return photons_traced()
+        && (*st).path.mode == MODE_MIXED
+        && ((*st).path.events & chain) == (EVENT_SEEN | EVENT_VIRTUAL_CHAIN);
+}
+
+fn vertex_left_to_photons(st: ptr<function, PathState>, s: Surface) -> bool {
+    return photons_traced()
+        && (*st).path.mode == MODE_MIXED
+        && (*st).ray.side == SIDE_VIRTUAL
+        && ((*st).path.events & (EVENT_SEEN | EVENT_REAL_CHAIN)) == EVENT_SEEN
+        && bsdf_is_polished(s);
+}
+
+fn photons_traced() -> bool {
+    @if(paper) {
+        return false;
+    }
+    @else {
+        return frame.photon_sphere_count > 0u && (frame.flags & FRAME_NO_PHOTONS) == 0u;
     }
 }
 

@@ -5,15 +5,15 @@ import package::packed::records::{FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PI
 import package::shared::NONE;
 import package::material::bsdf::bsdf_albedo;
 import package::light::cones::{cone_pdf, cones_at};
-import package::cpu::contribution::{accumulate, density_weight, sample_key};
-import package::light::environment::env_radiance;
+import package::cpu::contribution::{accumulate, density_weight, events_after, left_to_photons, sample_key};
+import package::light::environment::{env_radiance, share_left_to_eye};
 import package::camera::lens::camera_ray_from;
 import package::light::lights::env_arriving;
 import package::math::{dot3, hash_combine, hash_u32};
 import package::camera::sampler::sample_4d;
 import package::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
 import package::cpu::state::{
-    COINCIDENCE, DELTA_DENSITY, FAR, FirstHit, Hits, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE,
+    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_SCATTERED, FAR, FirstHit, Hits, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE,
     PENDING_NEXT, PENDING_REAL, PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED,
     REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_VIRTUAL, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
     REQUEST_VIRTUAL_THEN_REAL, RealPath, STAGE_DIFFERENCE_BSDF, STAGE_DIFFERENCE_CONE, STAGE_DIFFERENCE_SHADOW, STAGE_DONE,
@@ -184,6 +184,10 @@ fn resume(st: ptr<function, PathState>) {
             (*st).path.pending &= ~PENDING_NEXT;
             follow(st, path_nexts[lane]);
             if (*st).path.mode == MODE_DIFFERENCE {
+                @if(photons) {
+                    let smooth_ = ((*st).path.events & EVENT_AT_POLISHED) != 0u;
+                    (*st).path.events = events_after((*st).path.events, (*st).ray.depth, (*st).ray.side, smooth_);
+                }
                 (*st).path.stage = STAGE_DIFFERENCE_CONE;
                 (*st).ray.request = REQUEST_VIRTUAL_THEN_REAL;
             } else {
@@ -208,7 +212,7 @@ fn resume(st: ptr<function, PathState>) {
                 end_cone_capture(st);
                 (*st).path.mode = MODE_DIFFERENCE;
                 follow(st, path_differences[lane].segment);
-                (*st).path.indirect = 1u;
+                (*st).path.events = path_differences[lane].events | EVENT_SCATTERED;
                 (*st).ray.origin = path_differences[lane].origin;
                 (*st).ray.side = 0u;
                 (*st).ray.depth = path_differences[lane].depth;
@@ -229,7 +233,7 @@ fn follow(st: ptr<function, PathState>, segment: Segment) {
     (*st).path.density = segment.density;
     (*st).path.throughput = segment.throughput;
     (*st).path.medium = segment.medium;
-    if segment.density != DELTA_DENSITY { (*st).path.indirect = 1u; }
+    if segment.density != DELTA_DENSITY { (*st).path.events |= EVENT_SCATTERED; }
 }
 
 fn followed(st: ptr<function, PathState>) -> Segment {
@@ -272,7 +276,11 @@ fn paper_behind(st: ptr<function, PathState>) {
 
 fn path_escape(st: ptr<function, PathState>) {
     if (*st).ray.depth == 1u && (frame.flags & FRAME_ENV_DRAWN) == 0u { return; }
-    accumulate(st, escaping_light(st));
+    var light = escaping_light(st);
+    @if(photons) {
+        if left_to_photons(st) { light *= share_left_to_eye((*st).ray.direction); }
+    }
+    accumulate(st, light);
 }
 
 fn escaping_light(st: ptr<function, PathState>) -> vec3<f32> {

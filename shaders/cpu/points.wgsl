@@ -5,8 +5,8 @@ import package::packed::records::PIXEL_SHARES;
 import package::material::bsdf::bsdf_is_lambertian;
 import package::material::surface::Surface;
 import package::cpu::state::{
-    Capture, FIRST_DIFFERENCE, FIRST_NONE, FIRST_VIRTUAL, FirstVertex, MODE_DIFFERENCE, MODE_MIXED, POINT_COVERED, POINT_COVERING, POINT_NONE, POINT_RECURSION, PathState,
-    SharedPoint, path_captures, path_firsts, path_points, path_results,
+    FIRST_DIFFERENCE, FIRST_NONE, FIRST_VIRTUAL, FirstVertex, MODE_DIFFERENCE, MODE_MIXED, POINT_COVERED, POINT_COVERING, POINT_NONE, POINT_RECURSION, PathState,
+    SharedPoint, path_firsts, path_points, path_results,
 };
 
 fn shares(st: ptr<function, PathState>) -> bool {
@@ -26,6 +26,8 @@ fn keep_first_vertex(st: ptr<function, PathState>, s: Surface, cone_probability:
         bsdf_probability,
         (*st).path.throughput * s.base_color,
         kept,
+        vec3<f32>(0.0),
+        POINT_NONE,
     );
 }
 
@@ -51,23 +53,24 @@ fn offer_point(st: ptr<function, PathState>, s: Surface) {
     let strength = max(max(throughput.x, throughput.y), throughput.z);
     (*st).path.throughput = vec3<f32>(strength);
     path_points[lane][kind] = SharedPoint(s.position, s.error, s.ng, strength, vec3<f32>(0.0), 0u);
-    path_captures[lane] = Capture(path_results[lane].radiance, kind);
+    path_firsts[lane].own = path_results[lane].radiance;
+    path_firsts[lane].capture = kind;
     path_results[lane].radiance = vec3<f32>(0.0);
 }
 
 fn end_capture(st: ptr<function, PathState>) {
     @if(sharing) {
         let lane = (*st).lane;
-        let capture = path_captures[lane];
-        if capture.point == POINT_NONE { return; }
-        path_points[lane][capture.point].radiance = path_results[lane].radiance;
-        path_results[lane].radiance = capture.own;
-        path_captures[lane].point = POINT_NONE;
+        let kind = path_firsts[lane].capture;
+        if kind == POINT_NONE { return; }
+        path_points[lane][kind].radiance = path_results[lane].radiance;
+        path_results[lane].radiance = path_firsts[lane].own;
+        path_firsts[lane].capture = POINT_NONE;
     }
 }
 
 fn end_cone_capture(st: ptr<function, PathState>) {
     @if(sharing) {
-        if path_captures[(*st).lane].point != POINT_RECURSION { end_capture(st); }
+        if path_firsts[(*st).lane].capture != POINT_RECURSION { end_capture(st); }
     }
 }

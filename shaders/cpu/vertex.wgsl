@@ -1,15 +1,16 @@
 // One vertex of any path: emission, next event, cone direction, continuation. Rust twin: src/cpu/vertex.rs.
 
-import package::gpu::buffers::{frame, materials};
+import package::gpu::buffers::{frame, lights, materials};
 import package::packed::records::{
-    FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED,
+    FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, LIGHT_ENVIRONMENT, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED,
     MATERIAL_UNLIT, SIDE_REAL, SIDE_VIRTUAL,
 };
 import package::shared::NONE;
-import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample};
+import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample};
 import package::camera::sampler::{SampleSet, fourth, pair, second_pair, third};
 import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres};
-import package::cpu::contribution::{accumulate, density_weight, draw};
+import package::cpu::contribution::{accumulate, density_weight, draw, events_after, left_to_photons, vertex_left_to_photons};
+import package::light::environment::share_left_to_eye;
 import package::cpu::points::{keep_first_vertex, offer_point};
 import package::cpu::contribution::{
     SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
@@ -17,7 +18,7 @@ import package::cpu::contribution::{
 import package::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 import package::math::{dot3, exp_, safe_sqrt};
 import package::cpu::state::{
-    COINCIDENCE, DELTA_DENSITY, DifferenceRay, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
+    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, DifferenceRay, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
     PENDING_SHADOW, PathState, REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED,
     REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL, RayOrigin, Segment, path_differences, path_nexts,
 };
@@ -43,15 +44,18 @@ fn is_difference(st: ptr<function, PathState>) -> bool {
     }
 }
 
+fn transmittance(medium: u32, distance: f32) -> vec3<f32> {
+    if medium == NONE { return vec3<f32>(1.0); }
+    let sigma = materials[medium].sigma_a;
+    return vec3<f32>(exp_(-sigma.x * distance), exp_(-sigma.y * distance), exp_(-sigma.z * distance));
+}
+
 fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     let difference = is_difference(st);
     let wo = -(*st).ray.direction;
     let distance = (*st).vertex_hit.t;
     @if(transmission) {
-        if (*st).path.medium != NONE {
-            let sigma = materials[(*st).path.medium].sigma_a;
-            (*st).path.throughput *= vec3<f32>(exp_(-sigma.x * distance), exp_(-sigma.y * distance), exp_(-sigma.z * distance));
-        }
+        (*st).path.throughput *= transmittance((*st).path.medium, distance);
     }
     if !difference {
         add_emission(st, s, distance);
@@ -59,18 +63,12 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     if (*st).ray.depth > frame.max_bounces || (s.flags & EMITS_ONLY) != 0u || all((*st).path.throughput == vec3<f32>(0.0)) {
         return;
     }
-    let side = select(0u, 1u, (*st).vertex_hit.triangle >= frame.real_triangle_count);
-    let leaves_coinciding_real = side == SIDE_VIRTUAL && (*st).ray.side == SIDE_REAL && coincides(st, s, distance);
-    let reach = 1.0 + COINCIDENCE * distance / s.error;
-    (*st).ray.origin = RayOrigin(
-        s.position,
-        materials[s.material].self_shadow_bias,
-        s.ng * s.error,
-        select(reach, -reach, leaves_coinciding_real),
-    );
-    (*st).ray.side = side;
+    stand_at(st, s, distance);
     @if(sharing) { offer_point(st, s); }
 
+    @if(photons) {
+        if difference && bsdf_is_polished(s) { (*st).path.events |= EVENT_AT_POLISHED; }
+    }
     // Those of a path are played for certain.
     var techniques = Techniques(0.0, 1.0);
     @if(!paper) {
@@ -85,6 +83,19 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
         if difference { plan_cone(st, s, wo, techniques); }
     }
     plan_continuation(st, s, wo, techniques);
+}
+
+fn stand_at(st: ptr<function, PathState>, s: Surface, distance: f32) {
+    let side = select(0u, 1u, (*st).vertex_hit.triangle >= frame.real_triangle_count);
+    let leaves_coinciding_real = side == SIDE_VIRTUAL && (*st).ray.side == SIDE_REAL && coincides(st, s, distance);
+    let reach = 1.0 + COINCIDENCE * distance / s.error;
+    (*st).ray.origin = RayOrigin(
+        s.position,
+        materials[s.material].self_shadow_bias,
+        s.ng * s.error,
+        select(reach, -reach, leaves_coinciding_real),
+    );
+    (*st).ray.side = side;
 }
 
 fn lights_suffice(st: ptr<function, PathState>, s: Surface) -> bool {
@@ -127,6 +138,9 @@ fn add_emission(st: ptr<function, PathState>, s: Surface, distance: f32) {
     if max_element(s.emission) <= 0.0 { return; }
     var weight = 1.0;
     @if(area_lights) {
+        @if(photons) {
+            if s.light != NONE && lights[s.light].photon_pdf > 0.0 && left_to_photons(st) { return; }
+        }
         if s.light != NONE && (*st).path.density != DELTA_DENSITY {
             let direction = (*st).ray.direction;
             let from_position = s.position - direction * distance;
@@ -148,10 +162,18 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, technique
         index = light_select(choice_coin.x, choice_coin.y);
     }
     let l = light_sample(index, s.position, pair(u));
-    let contribution = light_contribution(st, s, wo, techniques, l);
+    var contribution = light_contribution(st, s, wo, techniques, l);
+    @if(photons) {
+        if vertex_left_to_photons(st, s) { contribution *= light_left_to_eye(index, l.direction); }
+    }
     if any(contribution != vec3<f32>(0.0)) {
         plan_shadow(st, s, l, contribution);
     }
+}
+
+fn light_left_to_eye(index: u32, direction: vec3<f32>) -> f32 {
+    if lights[index].kind == LIGHT_ENVIRONMENT { return share_left_to_eye(direction); }
+    return select(1.0, 0.0, lights[index].photon_pdf > 0.0);
 }
 
 fn light_contribution(
@@ -241,6 +263,13 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
     if !bsdf_is_lambertian(s) { lobe = third(u); }
     let b = bsdf_sample(s, wo, vec3<f32>(lobe, pair(u)));
     if !b.valid { return; }
+    var events = (*st).path.events;
+    @if(photons) {
+        if !(b.delta && b.transmitted && bsdf_passes_straight(s)) {
+            let smooth_ = b.delta || bsdf_is_polished(s);
+            events = events_after(events, (*st).ray.depth, (*st).ray.side, smooth_);
+        }
+    }
     var segment = Segment(
         b.wi,
         select(b.pdf, DELTA_DENSITY, b.delta),
@@ -258,7 +287,8 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
                 techniques.cone_probability,
                 (*st).ray.depth,
                 select(REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, leaves_to_cones),
-                vec2<u32>(),
+                events,
+                0u,
             );
             return;
         }
@@ -271,5 +301,6 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
         }
     }
     (*st).path.pending |= PENDING_NEXT;
+    (*st).path.events = events;
     path_nexts[(*st).lane] = segment;
 }

@@ -13,7 +13,7 @@ import package::cpu::request::answer;
 import package::work::rays::SampleRays;
 import package::cpu::state::{
     FAR, FIRST_NONE, PathResult, PathState, REQUEST_CLOSEST_REAL, STAGE_DONE, path_first_hits, path_hits, path_radiances_real, path_rays,
-    path_results, path_state, paths, POINTS, POINT_NONE, path_captures, path_firsts, path_points,
+    path_results, path_state, paths, POINTS, POINT_NONE, path_firsts, path_points,
 };
 import package::cpu::sharing::{gather, link_points};
 
@@ -28,7 +28,7 @@ fn kernel_generate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_
             path_firsts[lane].cone_probability = 0.0;
             path_firsts[lane].bsdf_probability = 0.0;
             for (var kind = 0u; kind < POINTS; kind++) { path_points[lane][kind].strength = 0.0; }
-            path_captures[lane].point = POINT_NONE;
+            path_firsts[lane].capture = POINT_NONE;
         }
         let item = work[lane % batch.pixel_count];
         let index = item.first + batch.sample_offset + lane / batch.pixel_count;

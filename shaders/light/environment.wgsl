@@ -104,6 +104,11 @@ fn env_radiance(direction: vec3<f32>) -> vec3<f32> {
     return env_scale();
 }
 
+fn share_left_to_eye(direction: vec3<f32>) -> f32 {
+    let brightness = luminance(env_radiance(direction));
+    return min(frame.env_traced_above / max(brightness, 1e-30), 1.0);
+}
+
 @if(environment_map)
 fn sample_linear(u: f32, a: f32, b: f32) -> f32 {
     let sum = a + b;

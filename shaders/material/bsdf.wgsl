@@ -1,8 +1,8 @@
 // Twin of src/material/bsdf.rs: the same operations in the same order.
 
 import package::packed::records::{MATERIAL_LAMBERTIAN, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT};
-import package::material::interface::max3;
-import package::material::lobes::{lobes_albedo, lobes_are_delta, lobes_bound, lobes_eval, lobes_sample};
+import package::material::interface::{max3, surface_index, thin_walled};
+import package::material::lobes::{lobes_albedo, lobes_are_delta, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample};
 import package::material::scatter::{BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, lambert_cos, sample_lambert};
 import package::math::INV_PI;
 import package::material::surface::Surface;
@@ -49,6 +49,19 @@ fn bsdf_is_delta(s: Surface) -> bool {
         return false;
     }
     return lobes_are_delta(s);
+}
+
+fn bsdf_is_polished(s: Surface) -> bool {
+    return !scatters_nothing(s) && !bsdf_is_lambertian(s) && lobes_are_polished(s);
+}
+
+fn bsdf_passes_straight(s: Surface) -> bool {
+    return thin_walled(s) || surface_index(s).eta2_minus_1 == 0.0;
+}
+
+fn bsdf_index_ratio(s: Surface) -> f32 {
+    if thin_walled(s) { return 1.0; }
+    return surface_index(s).eta;
 }
 
 fn bsdf_is_lambertian(s: Surface) -> bool {

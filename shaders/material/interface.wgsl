@@ -18,12 +18,16 @@ fn surface_index(s: Surface) -> RelativeIndex {
     return relative_index(s.ior, s.front || thin_walled(s));
 }
 
+fn transmits_unblurred(alpha: f32, ior: f32) -> bool {
+    return alpha < DELTA_ALPHA || alpha * abs(ior - 1.0) < DELTA_BEND;
+}
+
 fn reflects_delta(s: Surface) -> bool {
     return s.ggx_alpha < DELTA_ALPHA;
 }
 
 fn transmits_delta(s: Surface) -> bool {
-    return reflects_delta(s) || (!thin_walled(s) && s.ggx_alpha * abs(s.ior - 1.0) < DELTA_BEND);
+    return reflects_delta(s) || (!thin_walled(s) && transmits_unblurred(s.ggx_alpha, s.ior));
 }
 
 fn cos_to(normal: vec3<f32>, wo: vec3<f32>) -> f32 {

@@ -220,6 +220,12 @@ fn transmit_straight(s: Surface, wo: vec3<f32>) -> vec3<f32> {
     return on_side(s.ng, -1.0, unit(wi));
 }
 
+fn lobes_are_polished(s: Surface) -> bool {
+    return max3(diffuse_color(s)) == 0.0
+        && s.ggx_alpha < POLISHED_ALPHA
+        && (s.clearcoat == 0.0 || s.coat_alpha < POLISHED_ALPHA);
+}
+
 fn lobes_are_delta(s: Surface) -> bool {
     return max3(diffuse_color(s)) == 0.0 && reflects_delta(s) && (s.clearcoat == 0.0 || coat_delta(s));
 }

@@ -6,7 +6,7 @@
 use glam::Vec3;
 
 use super::shutter::{CameraPose, camera_pose};
-use crate::distortion::{Coefficients, distort, undistort_fast};
+use crate::distortion::{Coefficients, distort, distortion_area, undistort_fast};
 use crate::math::{INV_TAU, dot3, normalize3, sincos_2pi};
 use crate::packed::{APERTURE_DISC, APERTURE_SQUARE, Frame};
 use crate::shared::shared;
@@ -140,6 +140,11 @@ pub fn lens_distort(frame: &Frame, x: f32, y: f32) -> [f32; 2] {
 /// Ideal normalised coordinates of distorted ones, by Newton's method; the argument itself where there is no distortion.
 pub fn lens_undistort(frame: &Frame, xd: f32, yd: f32) -> [f32; 2] {
     undistort_fast(&coefficients(frame), [xd, yd])
+}
+
+/// How much larger a small area is in distorted normalised coordinates than in ideal ones.
+pub fn lens_area(frame: &Frame, x: f32, y: f32) -> f32 {
+    distortion_area(&coefficients(frame), [x, y])
 }
 
 fn coefficients(frame: &Frame) -> Coefficients<f32> {

@@ -3,6 +3,7 @@
 pub mod lens;
 pub mod sampler;
 pub mod shutter;
+pub mod splat;
 
 #[cfg(test)]
 pub mod chi_squared;

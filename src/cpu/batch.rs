@@ -4,10 +4,9 @@
 //! depend on what else is in flight.
 
 use super::estimator::{advance, begin_sample};
+use super::in_flight::{InFlight, Member};
 use super::request::answer;
-use super::sharing::{
-    LINKS, MEMBERS, Member, TILE_STRIDE, gather, link_points, member_of, tile_of,
-};
+use super::sharing::{LINKS, MEMBERS, TILE_STRIDE, gather, link_points, member_of, tile_of};
 use super::state::{FIRST_NONE, PathState, STAGE_COUNT, STAGE_DONE, path_state};
 use crate::packed::PackedScene;
 use crate::work::SampleRays;
@@ -31,13 +30,6 @@ pub struct Batch {
     advanced: Queues,
     /// Traces for what samples share.
     probe: PathState,
-}
-
-/// One of them.
-pub struct InFlight {
-    /// Among the pixel's samples: not [`super::state::Path::index`] where the pixel's differences take turns.
-    pub index: u32,
-    pub state: PathState,
 }
 
 impl Default for Batch {

@@ -4,7 +4,8 @@ use glam::Vec3;
 
 use super::state::*;
 use crate::camera::sampler::{SampleKey, SampleSet, sample_set};
-use crate::packed::{ESTIMATOR_PAPER, PackedScene};
+use crate::material::{Surface, bsdf_is_polished};
+use crate::packed::{ESTIMATOR_PAPER, FRAME_NO_PHOTONS, Frame, PackedScene, SIDE_VIRTUAL};
 use crate::shared::shared;
 
 shared! {
@@ -40,7 +41,7 @@ pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {
 pub fn accumulate(scene: &PackedScene, st: &mut PathState, light: Vec3) {
     let paper = scene.frame.estimator == ESTIMATOR_PAPER;
     let mut light = light;
-    if st.path.indirect != 0 {
+    if st.path.events & EVENT_SCATTERED != 0 {
         // How many samples this one stands for does not change what it is clamped to.
         let limit = scene.frame.clamp_indirect * st.path.weight;
         let largest = light.abs().max_element();
@@ -54,6 +55,50 @@ pub fn accumulate(scene: &PackedScene, st: &mut PathState, light: Vec3) {
     if paper && (st.path.mode == MODE_REAL || st.path.mode == MODE_SHARED) {
         st.radiance_real += light;
     }
+}
+
+/// `events` after one more vertex of `depth` in a world (`side`): `smooth` if a mirror or a smooth interface scattered there, or it is polished. That it scattered
+/// otherwise is noted once the ray is followed.
+pub fn events_after(events: u32, depth: u32, side: u32, smooth: bool) -> u32 {
+    if !smooth {
+        let seen = if depth == 1 { EVENT_SEEN } else { 0 };
+        return (events & (EVENT_SEEN | EVENT_SCATTERED)) | seen;
+    }
+    let chain = if side == SIDE_VIRTUAL {
+        EVENT_VIRTUAL_CHAIN
+    } else {
+        EVENT_REAL_CHAIN
+    };
+    // The difference's chain comes back to its first vertex after the cone's ray has left it.
+    let before = if depth == 1 {
+        events & EVENT_SCATTERED
+    } else {
+        events & !EVENT_AT_POLISHED
+    };
+    before | chain
+}
+
+/// Whether photons bring what a mixed path now finds: from a vertex that scatters, smooth virtual surfaces alone lead to the light.
+pub fn left_to_photons(scene: &PackedScene, st: &PathState) -> bool {
+    let chain = EVENT_SEEN | EVENT_VIRTUAL_CHAIN | EVENT_REAL_CHAIN;
+    photons_traced(&scene.frame)
+        && st.path.mode == MODE_MIXED
+        && st.path.events & chain == EVENT_SEEN | EVENT_VIRTUAL_CHAIN
+}
+
+/// Whether photons bring what lights send by way of the vertex of a mixed path: it is virtual and polished, and comes after one that scatters.
+pub fn vertex_left_to_photons(scene: &PackedScene, st: &PathState, s: &Surface) -> bool {
+    photons_traced(&scene.frame)
+        && st.path.mode == MODE_MIXED
+        && st.ray.side == SIDE_VIRTUAL
+        && st.path.events & (EVENT_SEEN | EVENT_REAL_CHAIN) == EVENT_SEEN
+        && bsdf_is_polished(s)
+}
+
+pub fn photons_traced(frame: &Frame) -> bool {
+    frame.photon_sphere_count > 0
+        && frame.flags & FRAME_NO_PHOTONS == 0
+        && frame.estimator != ESTIMATOR_PAPER
 }
 
 /// Power heuristic (Veach 1997, section 9.2.3) of a direction drawn with `density` that another technique draws with density `pdf`.

@@ -16,7 +16,7 @@ use crate::camera::lens::camera_ray_from;
 use crate::camera::sampler::sample_4d;
 use crate::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
 use crate::light::cones::{cone_pdf, cones_at};
-use crate::light::environment::env_radiance;
+use crate::light::environment::{env_radiance, share_left_to_eye};
 use crate::light::lights::env_arriving;
 use crate::material::{Surface, bsdf_albedo, surface_at};
 use crate::math::{hash_combine, hash_u32};
@@ -137,7 +137,7 @@ pub fn advance(scene: &PackedScene, st: &mut PathState) {
 }
 
 /// True where the virtual hit covers the real one.
-fn virtual_is_nearer(hits: &Hits) -> bool {
+pub fn virtual_is_nearer(hits: &Hits) -> bool {
     let Hits {
         in_real,
         in_virtual,
@@ -229,6 +229,8 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             st.path.pending &= !PENDING_NEXT;
             follow(st, st.next);
             if st.path.mode == MODE_DIFFERENCE {
+                let smooth = st.path.events & EVENT_AT_POLISHED != 0;
+                st.path.events = events_after(st.path.events, st.ray.depth, st.ray.side, smooth);
                 st.path.stage = STAGE_DIFFERENCE_CONE;
                 st.ray.request = REQUEST_VIRTUAL_THEN_REAL;
             } else {
@@ -255,7 +257,7 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             end_cone_capture(st);
             st.path.mode = MODE_DIFFERENCE;
             follow(st, st.difference.segment);
-            st.path.indirect = 1;
+            st.path.events = st.difference.events | EVENT_SCATTERED;
             st.ray.origin = st.difference.origin;
             st.ray.side = 0;
             st.ray.depth = st.difference.depth;
@@ -277,7 +279,7 @@ fn follow(st: &mut PathState, segment: Segment) {
     st.path.throughput = segment.throughput;
     st.path.medium = segment.medium;
     if segment.density != DELTA_DENSITY {
-        st.path.indirect = 1;
+        st.path.events |= EVENT_SCATTERED;
     }
 }
 
@@ -338,7 +340,10 @@ fn path_escape(scene: &PackedScene, st: &mut PathState) {
     if st.ray.depth == 1 && scene.frame.flags & FRAME_ENV_DRAWN == 0 {
         return;
     }
-    let light = escaping_light(scene, st);
+    let mut light = escaping_light(scene, st);
+    if left_to_photons(scene, st) {
+        light *= share_left_to_eye(scene, st.ray.direction);
+    }
     accumulate(scene, st, light);
 }
 

@@ -3,6 +3,8 @@
 mod batch;
 pub mod contribution;
 pub mod estimator;
+mod in_flight;
+pub mod photons;
 pub mod pilot;
 pub mod points;
 pub mod render;

@@ -37,6 +37,8 @@ pub fn keep_first_vertex(
         bsdf_probability,
         throughput: st.path.throughput * s.base_color,
         kept,
+        own: Vec3::ZERO,
+        capture: POINT_NONE,
     };
 }
 
@@ -72,27 +74,25 @@ pub fn offer_point(scene: &PackedScene, st: &mut PathState, s: &Surface) {
         radiance: Vec3::ZERO,
         pad: 0,
     };
-    st.capture = Capture {
-        own: st.result.radiance,
-        point,
-    };
+    st.first.own = st.result.radiance;
+    st.first.capture = point;
     st.result.radiance = Vec3::ZERO;
 }
 
 /// What was found since [`offer_point`] goes to the point.
 pub fn end_capture(st: &mut PathState) {
-    let Capture { own, point } = st.capture;
+    let point = st.first.capture;
     if point == POINT_NONE {
         return;
     }
     st.points[point as usize].radiance = st.result.radiance;
-    st.result.radiance = own;
-    st.capture.point = POINT_NONE;
+    st.result.radiance = st.first.own;
+    st.first.capture = POINT_NONE;
 }
 
 /// A path that comes from the cones ends before another begins; the recursion is the last of all.
 pub fn end_cone_capture(st: &mut PathState) {
-    if st.capture.point != POINT_RECURSION {
+    if st.first.capture != POINT_RECURSION {
         end_capture(st);
     }
 }

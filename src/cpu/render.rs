@@ -3,8 +3,9 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::batch::{Batch, InFlight, run_alone};
+use super::batch::{Batch, run_alone};
 use super::estimator::{begin_sample, is_without_turn};
+use super::in_flight::InFlight;
 use super::tiles::{Tile, TileWork, tiles};
 use crate::film::{Film, Sample, guide_add, pixel_add_real};
 use crate::packed::{ESTIMATOR_PAPER, PackedScene};

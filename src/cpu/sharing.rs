@@ -9,11 +9,12 @@
 //! t_j f_j(w_j) G_j(y) V_j(y) B / sum over members k of P_k p_k(w_k) |cos(y, w_k)| / d_k^2 V_k(y)
 //! ```
 //!
-//! with the members whose first vertices estimate the same (the balance heuristic over the members' techniques; P_k is the chance that k plays its technique at all), f being albedo / pi.
+//! with the members whose first vertices estimate the same: the balance heuristic over the members' techniques. P_k is the chance that k plays
+//! its technique at all, f is albedo / pi.
 
 use glam::Vec3;
 
-use super::batch::InFlight;
+use super::in_flight::{InFlight, Member};
 use super::request::answer;
 use super::state::*;
 use super::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS};
@@ -148,15 +149,6 @@ fn link_of(kind: u32, from: u32, to: u32) -> u32 {
     }
     let (column, row) = (to % TILE_SIDE, to / TILE_SIDE);
     first_link(kind) + row % QUARTER_SIDE * QUARTER_SIDE + column % QUARTER_SIDE
-}
-
-/// A sample that takes part in its tile.
-#[derive(Clone, Copy)]
-pub struct Member {
-    /// Its place in the batch.
-    pub slot: usize,
-    /// Its pixel's number in the tile.
-    pub number: u32,
 }
 
 /// Weighs the points of one member's sample against all members that could have drawn them: how much of a point's radiance each of them

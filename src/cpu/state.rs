@@ -75,6 +75,17 @@ shared! {
     /// A vertex to be shaded: `vertex_hit`, reached along the ray. Never left pending while a ray is traced.
     pub const PENDING_VERTEX: u32 = 16;
 
+    /// The path has scattered other than by a mirror or a smooth interface: what it finds is clamped.
+    pub const EVENT_SCATTERED: u32 = 1;
+    /// It did so at its first vertex: photons that land there can be seen by the camera.
+    pub const EVENT_SEEN: u32 = 2;
+    /// Since it last did so it has met smooth virtual surfaces.
+    pub const EVENT_VIRTUAL_CHAIN: u32 = 4;
+    /// Since it last did so it has met smooth real surfaces.
+    pub const EVENT_REAL_CHAIN: u32 = 8;
+    /// The present vertex of a difference is polished.
+    pub const EVENT_AT_POLISHED: u32 = 16;
+
     /// Density that stands for a delta distribution: no other technique can find its directions.
     pub const DELTA_DENSITY: f32 = -1.0;
 
@@ -160,8 +171,8 @@ shared! {
         pub pending: u32,
         /// Material whose volume the path is inside, or NONE.
         pub medium: u32,
-        /// 1 once the path has scattered other than by a mirror or a smooth interface: what it finds is clamped.
-        pub indirect: u32,
+        /// `EVENT_*` bits: how the path has scattered so far.
+        pub events: u32,
         /// Surface interactions up to and including the first vertex of the real path that waits.
         pub real_depth: u32,
     }
@@ -196,7 +207,9 @@ shared! {
         pub depth: u32,
         /// [`REQUEST_REAL_UNLESS_COVERED`] where what the cones cover is left to them, else [`REQUEST_CLOSEST_EACH`].
         pub request: u32,
-        pub pad: [u32; 2],
+        /// As [`Path::events`], once the ray is followed.
+        pub events: u32,
+        pub pad: u32,
     }
 
     /// What the sample has found.
@@ -224,6 +237,10 @@ shared! {
         pub throughput: Vec3,
         /// `FIRST_*`.
         pub kept: u32,
+        /// What the sample had found before what it finds went to a point.
+        pub own: Vec3,
+        /// Point that what is found goes to, `POINT_*`.
+        pub capture: u32,
     }
 
     /// A second vertex, whose light other first vertices may use.
@@ -239,15 +256,6 @@ shared! {
         /// What leaves the point towards any other: the difference, the mixed radiance, or the real one.
         pub radiance: Vec3,
         pub pad: u32,
-    }
-
-    /// What is found goes to a shared point for the while.
-    #[derive(Clone, Copy, Debug)]
-    pub struct Capture {
-        /// What the sample had found before.
-        pub own: Vec3,
-        /// `POINT_*`.
-        pub point: u32,
     }
 
     /// The first surface met.
@@ -278,7 +286,6 @@ pub struct PathState {
     pub first: FirstVertex,
     /// By `POINT_*`.
     pub points: [SharedPoint; POINTS as usize],
-    pub capture: Capture,
     /// The vertex to be shaded next.
     pub vertex_hit: Hit,
     pub rays: SampleRays,
@@ -309,6 +316,8 @@ const NO_FIRST_VERTEX: FirstVertex = FirstVertex {
     bsdf_probability: 0.0,
     throughput: Vec3::ZERO,
     kept: FIRST_NONE,
+    own: Vec3::ZERO,
+    capture: POINT_NONE,
 };
 
 const NO_POINT: SharedPoint = SharedPoint {
@@ -347,7 +356,7 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
             mode: MODE_MIXED,
             pending: 0,
             medium: NONE,
-            indirect: 0,
+            events: 0,
             real_depth: 0,
         },
         next: NO_SEGMENT,
@@ -362,7 +371,8 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
             cone_probability: 0.0,
             depth: 0,
             request: 0,
-            pad: [0; 2],
+            events: 0,
+            pad: 0,
         },
         result: PathResult {
             radiance: Vec3::ZERO,
@@ -377,10 +387,6 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
         },
         first: NO_FIRST_VERTEX,
         points: [NO_POINT; POINTS as usize],
-        capture: Capture {
-            own: Vec3::ZERO,
-            point: POINT_NONE,
-        },
         vertex_hit: MISS,
         rays: SampleRays::default(),
     }

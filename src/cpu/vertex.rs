@@ -10,15 +10,17 @@ use crate::light::blocking::light_may_be_blocked;
 use crate::light::cones::{
     Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres,
 };
+use crate::light::environment::share_left_to_eye;
 use crate::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 use crate::material::{
-    Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_sample,
+    Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_is_polished,
+    bsdf_passes_straight, bsdf_sample,
 };
 use crate::math::{dot3, exp_, safe_sqrt};
 use crate::packed::{
     ESTIMATOR_PAPER, FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES,
-    FRAME_NO_LAST_VERTEX, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE,
-    PackedScene, SIDE_REAL, SIDE_VIRTUAL,
+    FRAME_NO_LAST_VERTEX, LIGHT_ENVIRONMENT, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED,
+    MATERIAL_UNLIT, NONE, PackedScene, SIDE_REAL, SIDE_VIRTUAL,
 };
 use crate::shared::shared;
 
@@ -38,7 +40,7 @@ shared! {
     pub const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
     /// Surfaces that scatter nothing.
-    const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
+    pub const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
 }
 
 /// What the techniques of a difference vertex share.
@@ -53,20 +55,26 @@ fn is_difference(st: &PathState) -> bool {
     st.path.mode == MODE_DIFFERENCE
 }
 
+/// Share of light that goes a distance (metres) through the volume of a material, or through none.
+pub fn transmittance(scene: &PackedScene, medium: u32, distance: f32) -> Vec3 {
+    if medium == NONE {
+        return Vec3::ONE;
+    }
+    let sigma = scene.materials[medium as usize].sigma_a;
+    Vec3::new(
+        exp_(-sigma[0] * distance),
+        exp_(-sigma[1] * distance),
+        exp_(-sigma[2] * distance),
+    )
+}
+
 /// Adds the emission at the vertex and plans its shadow ray and continuations. A difference vertex (mode `MODE_DIFFERENCE`) does not emit,
 /// for both worlds see it; its throughput multiplies the difference there.
 pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     let difference = is_difference(st);
     let wo = -st.ray.direction;
     let distance = st.vertex_hit.t;
-    if st.path.medium != NONE {
-        let sigma = scene.materials[st.path.medium as usize].sigma_a;
-        st.path.throughput *= Vec3::new(
-            exp_(-sigma[0] * distance),
-            exp_(-sigma[1] * distance),
-            exp_(-sigma[2] * distance),
-        );
-    }
+    st.path.throughput *= transmittance(scene, st.path.medium, distance);
     if !difference {
         add_emission(scene, st, s, distance);
     }
@@ -76,6 +84,30 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     {
         return;
     }
+    stand_at(scene, st, s, distance);
+    offer_point(scene, st, s);
+
+    if difference && bsdf_is_polished(s) {
+        st.path.events |= EVENT_AT_POLISHED;
+    }
+    let techniques = difference.then(|| techniques_at(scene, st, s, wo));
+    // The directions of a path are drawn for certain.
+    let (cones, bsdf) = techniques
+        .as_ref()
+        .map_or((0.0, 1.0), |t| (t.cone_probability, t.bsdf_probability));
+    keep_first_vertex(scene, st, s, cones, bsdf);
+    next_event(scene, st, s, wo, techniques.as_ref());
+    if lights_suffice(scene, st, s) {
+        return;
+    }
+    if let Some(techniques) = &techniques {
+        plan_cone(scene, st, s, wo, techniques);
+    }
+    plan_continuation(scene, st, s, wo, techniques.as_ref());
+}
+
+/// The next rays leave the vertex.
+pub fn stand_at(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: f32) {
     let side = if st.vertex_hit.triangle < scene.frame.real_triangle_count {
         SIDE_REAL
     } else {
@@ -95,22 +127,6 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
         },
     };
     st.ray.side = side;
-    offer_point(scene, st, s);
-
-    let techniques = difference.then(|| techniques_at(scene, st, s, wo));
-    // The directions of a path are drawn for certain.
-    let (cones, bsdf) = techniques
-        .as_ref()
-        .map_or((0.0, 1.0), |t| (t.cone_probability, t.bsdf_probability));
-    keep_first_vertex(scene, st, s, cones, bsdf);
-    next_event(scene, st, s, wo, techniques.as_ref());
-    if lights_suffice(scene, st, s) {
-        return;
-    }
-    if let Some(techniques) = &techniques {
-        plan_cone(scene, st, s, wo, techniques);
-    }
-    plan_continuation(scene, st, s, wo, techniques.as_ref());
 }
 
 /// Whether the light drawn at the vertex is all the light there is to find: past the last vertex a path finds only emitters. (`paper` traces
@@ -169,6 +185,12 @@ fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: 
     if s.emission.max_element() <= 0.0 {
         return;
     }
+    if s.light != NONE
+        && scene.lights[s.light as usize].photon_pdf > 0.0
+        && left_to_photons(scene, st)
+    {
+        return;
+    }
     let mut weight = 1.0;
     if s.light != NONE && st.path.density != DELTA_DENSITY {
         let direction = st.ray.direction;
@@ -211,10 +233,22 @@ fn next_event(
         return;
     }
     let l = light_sample(scene, index, s.position, u.pair());
-    let contribution = light_contribution(scene, st, s, wo, techniques, &l);
+    let mut contribution = light_contribution(scene, st, s, wo, techniques, &l);
+    if vertex_left_to_photons(scene, st, s) {
+        contribution *= light_left_to_eye(scene, index, l.direction);
+    }
     if contribution != Vec3::ZERO {
         plan_shadow(st, s, &l, contribution);
     }
+}
+
+/// Share of a light from `direction` that the eye's paths bring by way of smooth and polished virtual surfaces.
+fn light_left_to_eye(scene: &PackedScene, index: u32, direction: Vec3) -> f32 {
+    let light = &scene.lights[index as usize];
+    if light.kind == LIGHT_ENVIRONMENT {
+        return share_left_to_eye(scene, direction);
+    }
+    if light.photon_pdf > 0.0 { 0.0 } else { 1.0 }
 }
 
 /// What a drawn light adds if nothing hides it (or, for the difference, if only something virtual does); zero if that cannot be.
@@ -316,7 +350,7 @@ fn plan_cone(
 }
 
 /// Material whose volume a direction from the vertex leads through, or NONE.
-fn medium_along(st: &PathState, s: &Surface, direction: Vec3) -> u32 {
+pub fn medium_along(st: &PathState, s: &Surface, direction: Vec3) -> u32 {
     if s.flags & MATERIAL_THIN_WALLED != 0 || s.ng.dot(direction) >= 0.0 {
         return st.path.medium;
     }
@@ -355,6 +389,13 @@ fn plan_continuation(
     if !b.valid {
         return;
     }
+    let straight = b.delta && b.transmitted && bsdf_passes_straight(s);
+    let events = if straight {
+        st.path.events
+    } else {
+        let smooth = b.delta || bsdf_is_polished(s);
+        events_after(st.path.events, st.ray.depth, st.ray.side, smooth)
+    };
     let mut segment = Segment {
         direction: b.wi,
         density: if b.delta { DELTA_DENSITY } else { b.pdf },
@@ -375,7 +416,8 @@ fn plan_continuation(
             } else {
                 REQUEST_CLOSEST_EACH
             },
-            pad: [0; 2],
+            events,
+            pad: 0,
         };
         return;
     }
@@ -387,5 +429,6 @@ fn plan_continuation(
         segment.throughput *= 1.0 / survival;
     }
     st.path.pending |= PENDING_NEXT;
+    st.path.events = events;
     st.next = segment;
 }

@@ -1,6 +1,7 @@
 //! The film: sums over camera samples, a record a pixel.
 
-use crate::film::sums::{GuideSums, PixelSums};
+use crate::film::splats::{Splat, SplatSums, is_unusable_splat};
+use crate::film::sums::{GuideSums, PixelSums, count_unusable};
 
 /// What a pixel shows, known from the samples taken so far (design: background M = 0, virtual M = 1, edge between).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +29,8 @@ pub enum MergeError {
     Size(u32, u32, u32, u32),
     #[error("one film has depth, normal and albedo planes, the other has none")]
     Guides,
+    #[error("one film has photons, the other has none; render both alike")]
+    Photons,
     #[error(
         "they were planned differently at pixel {0}: with another --no-skip, or by another kind of machine; render both alike"
     )]
@@ -51,6 +54,8 @@ pub struct Film {
     pub pixels: Vec<PixelSums>,
     /// Empty unless depth, normal and albedo were asked for.
     pub guides: Vec<GuideSums>,
+    /// Empty unless photons are traced.
+    pub splats: Vec<SplatSums>,
 }
 
 impl Film {
@@ -63,6 +68,42 @@ impl Film {
             first_sample,
             pixels: bytemuck::zeroed_vec(count),
             guides: bytemuck::zeroed_vec(if with_guides { count } else { 0 }),
+            splats: Vec::new(),
+        }
+    }
+
+    /// Makes room for photons, or takes it back; none are kept.
+    pub fn set_photons(&mut self, traced: bool) {
+        let count = if traced { self.pixels.len() } else { 0 };
+        self.splats = bytemuck::zeroed_vec(count);
+    }
+
+    /// Photons that every pixel has seen traced.
+    pub fn photons(&self) -> u64 {
+        self.splats.first().map_or(0, |sums| sums.photons)
+    }
+
+    /// Adds what `photons` more photons brought.
+    pub fn add_splats(&mut self, photons: u64, splats: impl Iterator<Item = Splat>) {
+        for splat in splats {
+            let pixel = splat.pixel as usize;
+            if is_unusable_splat(splat.value) {
+                count_unusable(&mut self.pixels[pixel], 0);
+            } else {
+                self.splats[pixel].add(&splat);
+            }
+        }
+        for sums in &mut self.splats {
+            sums.photons += photons;
+        }
+    }
+
+    /// A pixel's sums, with what photons brought.
+    pub fn sums(&self, pixel: usize) -> PixelSums {
+        let sums = self.pixels[pixel];
+        match self.splats.get(pixel) {
+            Some(splats) => splats.folded_into(sums, self.splats.len() as f64),
+            None => sums,
         }
     }
 
@@ -82,6 +123,7 @@ impl Film {
             };
         }
         self.guides.fill(GuideSums::default());
+        self.splats.fill(SplatSums::default());
     }
 
     /// Index of a pixel's first sample in this film.
@@ -148,6 +190,9 @@ impl Film {
         if self.guides.len() != other.guides.len() {
             return Err(MergeError::Guides);
         }
+        if self.splats.len() != other.splats.len() {
+            return Err(MergeError::Photons);
+        }
         if other.first_sample < self.first_sample {
             let mut merged = other.clone();
             merged.merge(self)?;
@@ -176,6 +221,9 @@ impl Film {
             a.merge(b);
         }
         for (a, b) in self.guides.iter_mut().zip(&other.guides) {
+            a.merge(b);
+        }
+        for (a, b) in self.splats.iter_mut().zip(&other.splats) {
             a.merge(b);
         }
         Ok(())

@@ -52,11 +52,9 @@ pub struct Planes {
 
 /// The composited picture. Without a photograph Ic is 0.
 pub fn composite(film: &Film, photo: Option<&Photo>, mode: Composite) -> Picture {
-    let linear = film
-        .pixels
-        .par_iter()
-        .enumerate()
-        .map(|(pixel, sums)| composite_pixel(sums, photo_at(photo, pixel), mode))
+    let linear = (0..film.pixels.len())
+        .into_par_iter()
+        .map(|pixel| composite_pixel(&film.sums(pixel), photo_at(photo, pixel), mode))
         .collect();
     Picture {
         width: film.width,
@@ -156,22 +154,18 @@ fn variance_pixel(sums: &PixelSums, ic: [f32; 3]) -> DVec3 {
 
 /// Estimated root-mean-square error of the picture (linear), from the variance plane: an upper estimate for stratified samplers.
 pub fn estimated_error(film: &Film, photo: Option<&Photo>) -> f64 {
-    let sum: f64 = film
-        .pixels
-        .iter()
-        .enumerate()
-        .map(|(pixel, sums)| variance_pixel(sums, photo_at(photo, pixel)).element_sum() / 3.0)
+    let sum: f64 = (0..film.pixels.len())
+        .map(|pixel| variance_pixel(&film.sums(pixel), photo_at(photo, pixel)).element_sum() / 3.0)
         .sum();
     (sum / film.pixels.len().max(1) as f64).sqrt()
 }
 
 /// The `variance` plane alone.
 pub fn variance(film: &Film, photo: Option<&Photo>) -> Vec<[f32; 3]> {
-    film.pixels
-        .par_iter()
-        .enumerate()
-        .map(|(pixel, sums)| {
-            variance_pixel(sums, photo_at(photo, pixel))
+    (0..film.pixels.len())
+        .into_par_iter()
+        .map(|pixel| {
+            variance_pixel(&film.sums(pixel), photo_at(photo, pixel))
                 .as_vec3()
                 .to_array()
         })
@@ -181,23 +175,22 @@ pub fn variance(film: &Film, photo: Option<&Photo>) -> Vec<[f32; 3]> {
 /// All planes but the composite.
 pub fn planes(film: &Film, photo: Option<&Photo>) -> Planes {
     let rgb = |value: DVec3| value.as_vec3().to_array();
-    let each = |f: &(dyn Fn(usize, &PixelSums) -> [f32; 3] + Sync)| -> Vec<[f32; 3]> {
-        film.pixels
-            .par_iter()
-            .enumerate()
-            .map(|(pixel, sums)| f(pixel, sums))
+    let each = |f: &(dyn Fn(&PixelSums) -> [f32; 3] + Sync)| -> Vec<[f32; 3]> {
+        (0..film.pixels.len())
+            .into_par_iter()
+            .map(|pixel| f(&film.sums(pixel)))
             .collect()
     };
     Planes {
-        mixed: each(&|_, sums| {
+        mixed: each(&|sums| {
             let m = Means::of(sums);
             rgb(m.m_im + m.diff + m.r_ir)
         }),
-        real: each(&|_, sums| {
+        real: each(&|sums| {
             let m = Means::of(sums);
             rgb(m.m_ir + m.r_ir)
         }),
-        difference: each(&|_, sums| {
+        difference: each(&|sums| {
             let m = Means::of(sums);
             rgb(m.m_im - m.m_ir + m.diff)
         }),

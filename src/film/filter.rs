@@ -48,11 +48,11 @@ pub fn filter_difference(film: &Film, surfaces: &[Option<RealSurface>]) -> Film 
             .collect(),
     };
     let light: Vec<Vec3> = canvas.each(|pixel, surface| {
-        let sums = &film.pixels[pixel];
-        (sums.diff.value() / real_samples(sums)).as_vec3() / divisor(surface)
+        let sums = film.sums(pixel);
+        (sums.diff.value() / real_samples(&sums)).as_vec3() / divisor(surface)
     });
     let own: Vec<f32> =
-        canvas.each(|pixel, surface| own_variance(&film.pixels[pixel], divisor(surface)));
+        canvas.each(|pixel, surface| own_variance(&film.sums(pixel), divisor(surface)));
     let mut variance: Vec<f32> =
         canvas.each(|pixel, surface| canvas.variance(film, pixel, surface, &light, &own));
     let mut light = light;
@@ -64,6 +64,11 @@ pub fn filter_difference(film: &Film, surfaces: &[Option<RealSurface>]) -> Film 
         (light, variance) = both.into_iter().unzip();
     }
     let mut out = film.clone();
+    // What photons brought is smoothed with the rest.
+    out.set_photons(false);
+    for (pixel, sums) in out.pixels.iter_mut().enumerate() {
+        *sums = film.sums(pixel);
+    }
     out.pixels
         .par_iter_mut()
         .zip(&canvas.surfaces)

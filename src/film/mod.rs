@@ -7,6 +7,7 @@ mod filter;
 mod flip;
 mod pools;
 mod scrambles;
+pub(crate) mod splats;
 pub(crate) mod sums;
 #[cfg(test)]
 mod test_support;
@@ -22,6 +23,7 @@ pub use filter::{RealSurface, filter_difference};
 pub use flip::{flip, flip_map};
 pub use pools::pooled;
 pub use scrambles::Scrambles;
+pub use splats::{Splat, SplatSums};
 pub use sums::{
     GuideSums, PixelSums, Sample, Sum3, guide_add, is_unusable, pixel_add, pixel_add_real, sum_add,
     sum3_add, two_sum,

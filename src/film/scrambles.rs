@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::composite::{Means, QUOTIENT_EPSILON};
-use super::{Film, GuideSums, PixelSums};
+use super::{Film, GuideSums, PixelSums, SplatSums};
 use crate::scene::{Composite, Photo};
 
 /// What the composite of one channel is made of, scramble by scramble.
@@ -72,6 +72,7 @@ impl Scrambles {
     /// For films like this one, whose pixels `active` (row-major indices, ascending) alone are sampled.
     pub fn new(like: &Film, mode: Composite, active: Vec<u32>) -> Self {
         let mut film = Film::new(like.width, like.height, 0, !like.guides.is_empty());
+        film.set_photons(!like.splats.is_empty());
         film.set_sample_factors(like.pixels.iter().map(|sums| sums.sample_factor));
         let moments = vec![Moments::default(); active.len()];
         Self {
@@ -89,12 +90,12 @@ impl Scrambles {
             .par_iter()
             .zip(&mut self.moments)
             .for_each(|(&pixel, moments)| {
-                let sums = &scramble.pixels[pixel as usize];
+                let sums = scramble.sums(pixel as usize);
                 if sums.n == 0 {
                     return;
                 }
                 moments.count += 1;
-                let means = Means::of(sums);
+                let means = Means::of(&sums);
                 for (c, channel) in moments.channels.iter_mut().enumerate() {
                     channel.add(terms(&means, mode, c), moments.count);
                 }
@@ -109,6 +110,11 @@ impl Scrambles {
             .par_iter_mut()
             .zip(&scramble.guides)
             .for_each(|(sum, scramble)| sum.merge(scramble));
+        // Photons reach pixels that take no part as well.
+        (self.film.splats.iter_mut())
+            .zip(scramble.splats.iter().zip(&scramble.pixels))
+            .filter(|(_, (_, sums))| sums.n > 0)
+            .for_each(|(sum, (scramble, _))| sum.merge(scramble));
     }
 
     /// Takes back what a pixel was given.
@@ -120,6 +126,9 @@ impl Scrambles {
         };
         if let Some(guide) = self.film.guides.get_mut(pixel) {
             *guide = GuideSums::default();
+        }
+        if let Some(splats) = self.film.splats.get_mut(pixel) {
+            *splats = SplatSums::default();
         }
         if let Ok(slot) = self.active.binary_search(&(pixel as u32)) {
             self.moments[slot] = Moments::default();

@@ -199,7 +199,7 @@ pub fn pixel_add_real(sums: &mut PixelSums, index: u32, is_virtual: bool, real: 
     }
 }
 
-fn count_unusable(sums: &mut PixelSums, index: u32) {
+pub(super) fn count_unusable(sums: &mut PixelSums, index: u32) {
     if sums.non_finite == 0 {
         sums.first_non_finite = index;
     }

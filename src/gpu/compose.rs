@@ -72,6 +72,8 @@ features! {
     shutter,
     /// Second vertices are shared between pixels.
     sharing,
+    /// Photons are traced.
+    photons,
 }
 
 impl Features {
@@ -117,6 +119,7 @@ impl Features {
             rough_specular: material(&|m| m.flags & no_lobe == 0),
             shutter: scene.frame.flags & packed::FRAME_SHUTTER != 0,
             sharing: (scene.pixels.iter()).any(|info| info.flags & packed::PIXEL_SHARES != 0),
+            photons: cpu::contribution::photons_traced(&scene.frame),
         }
     }
 }
@@ -151,6 +154,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &camera::lens::SHARED,
     &camera::sampler::SHARED,
     &camera::shutter::SHARED,
+    &camera::splat::SHARED,
     &light::cones::SHARED,
     &light::environment::SHARED,
     &light::lights::SHARED,
@@ -164,8 +168,11 @@ pub(super) const DECLARED: &[&Module] = &[
     &material::texture::SHARED,
     &film::sums::SHARED,
     &super::lanes::SHARED,
+    &super::photons::SHARED,
     &cpu::contribution::SHARED,
     &cpu::estimator::SHARED,
+    &cpu::photons::emission::SHARED,
+    &cpu::photons::path::SHARED,
     &cpu::request::SHARED,
     &cpu::sharing::SHARED,
     &cpu::state::SHARED,

@@ -11,6 +11,7 @@ pub mod harness;
 pub mod kernel;
 mod lanes;
 mod pacer;
+mod photons;
 mod profile;
 pub mod wavefront;
 

@@ -9,6 +9,7 @@ use std::time::Instant;
 use super::kernel::{BindGroups, Kernel};
 use super::lanes::{Batch, Counters, Lanes, most_lanes, state_parts};
 use super::pacer::Pacer;
+use super::photons::Photons;
 use super::profile::{
     ACCUMULATE, ADVANCE, GENERATE, KERNELS, KernelSeconds, Profiler, SHARE, TRACE, TURN,
 };
@@ -18,7 +19,7 @@ use crate::film::Film;
 use crate::packed::PackedScene;
 use crate::shared::WORKGROUP;
 use crate::work::list::TILE_PLACES;
-use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
+use crate::work::{Pass, PhotonWork, PixelWork, RayCounts, Watcher, WorkList};
 
 /// Samples of one pixel in a batch at most, so that a batch has pixels enough to sum in parallel.
 const MOST_SAMPLES: u32 = 256;
@@ -36,6 +37,8 @@ pub struct GpuBackend {
     /// Bytes of each part of the state of one sample, by name.
     state_parts: BTreeMap<String, u64>,
     lanes: Option<Lanes>,
+    /// Made once there are photons to trace.
+    photons: Option<Photons>,
     /// By kernel and parity.
     groups: Vec<[BindGroups; 2]>,
     pacer: Pacer,
@@ -115,6 +118,7 @@ impl GpuBackend {
             self.scene = SceneBuffers::from_parts(&self.gpu, &parts)?;
             // Bind groups name the old buffers.
             self.lanes = None;
+            self.photons = None;
         }
         let features = Features::wanted(scene, self.specialised);
         if features != self.features {
@@ -141,6 +145,7 @@ impl GpuBackend {
             self.state_parts = state_parts;
         }
         self.lanes = None;
+        self.photons = None;
         self.warm = false;
         Ok(())
     }
@@ -171,6 +176,7 @@ impl GpuBackend {
             parked: Vec::new(),
             state_parts,
             lanes: None,
+            photons: None,
             groups: Vec::new(),
             pacer,
             warm: false,
@@ -242,6 +248,29 @@ impl GpuBackend {
             watcher.taken(now.iter().map(|pixel| u64::from(pixel.samples())).sum());
         }
         Ok(())
+    }
+
+    /// Traces the photons of `work` and adds what they bring to the film, as [`crate::cpu::photons::render::render`] does.
+    ///
+    /// # Errors
+    /// As [`GpuBackend::render`].
+    pub fn trace_photons(
+        &mut self,
+        film: &mut Film,
+        work: &PhotonWork,
+        rays: &mut RayCounts,
+        watcher: &Watcher<'_>,
+    ) -> Result<(), GpuError> {
+        let photons = match &mut self.photons {
+            Some(photons) => photons,
+            none => none.insert(Photons::new(
+                &self.gpu,
+                &Composer::default(),
+                &self.features,
+                &self.scene,
+            )?),
+        };
+        photons.render(&self.gpu, film, work, rays, watcher)
     }
 
     /// Makes room for `wanted` lanes, or for as many as there is memory for; returns how many may be used.

@@ -136,6 +136,12 @@ pub fn env_radiance(scene: &PackedScene, direction: Vec3) -> Vec3 {
     env_interpolate(&n, n.fy) * env_scale(&scene.frame)
 }
 
+/// Share of the light from `direction` that the eye's paths bring through smooth virtual objects; photons bring the rest.
+pub fn share_left_to_eye(scene: &PackedScene, direction: Vec3) -> f32 {
+    let brightness = luminance(env_radiance(scene, direction));
+    (scene.frame.env_traced_above / brightness.max(1e-30)).min(1.0)
+}
+
 /// Inverts the distribution whose density runs linearly from `a` to `b` over 0..1; uniform where both are 0.
 fn sample_linear(u: f32, a: f32, b: f32) -> f32 {
     let sum = a + b;

@@ -104,7 +104,7 @@ fn sample_point_light(light: &Light, position: Vec3) -> LightSample {
 }
 
 /// The fall-off that KHR_lights_punctual recommends: the square of a linear ramp between the cosines.
-fn spot_falloff(light: &Light, cos: f32) -> f32 {
+pub fn spot_falloff(light: &Light, cos: f32) -> f32 {
     let (inner, outer) = (light.axis_u[3], light.axis_v[3]);
     let ramp = ((cos - outer) / (inner - outer).max(1e-4)).clamp(0.0, 1.0);
     ramp * ramp

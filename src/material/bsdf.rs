@@ -2,8 +2,10 @@
 
 use glam::Vec3;
 
-use super::interface::max3;
-use super::lobes::{lobes_albedo, lobes_are_delta, lobes_bound, lobes_eval, lobes_sample};
+use super::interface::{max3, surface_index, thin_walled};
+use super::lobes::{
+    lobes_albedo, lobes_are_delta, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample,
+};
 use super::scatter::{
     BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, lambert_cos, sample_lambert,
 };
@@ -62,6 +64,25 @@ pub fn bsdf_is_delta(s: &Surface) -> bool {
         return false;
     }
     lobes_are_delta(s)
+}
+
+/// Nothing but lobes that mirror or bend light with little blur: as far as photons go, it is smooth.
+pub fn bsdf_is_polished(s: &Surface) -> bool {
+    !scatters_nothing(s) && !bsdf_is_lambertian(s) && lobes_are_polished(s)
+}
+
+/// What a smooth interface lets through goes straight on: it bends nothing.
+pub fn bsdf_passes_straight(s: &Surface) -> bool {
+    thin_walled(s) || surface_index(s).eta2_minus_1 == 0.0
+}
+
+/// Index of the volume beyond the surface over that on the side of the ray.
+pub fn bsdf_index_ratio(s: &Surface) -> f32 {
+    if thin_walled(s) {
+        1.0
+    } else {
+        surface_index(s).eta
+    }
 }
 
 /// f = base colour / pi, whatever the directions.

@@ -44,12 +44,17 @@ pub fn surface_index(s: &Surface) -> RelativeIndex {
     relative_index(s.ior, s.front || thin_walled(s))
 }
 
+/// Whether the interface of a volume with that index, of a GGX alpha, lets light through unblurred.
+pub fn transmits_unblurred(alpha: f32, ior: f32) -> bool {
+    alpha < DELTA_ALPHA || alpha * (ior - 1.0).abs() < DELTA_BEND
+}
+
 pub fn reflects_delta(s: &Surface) -> bool {
     s.ggx_alpha < DELTA_ALPHA
 }
 
 pub fn transmits_delta(s: &Surface) -> bool {
-    reflects_delta(s) || (!thin_walled(s) && s.ggx_alpha * (s.ior - 1.0).abs() < DELTA_BEND)
+    reflects_delta(s) || (!thin_walled(s) && transmits_unblurred(s.ggx_alpha, s.ior))
 }
 
 pub fn cos_to(normal: Vec3, wo: Vec3) -> f32 {

@@ -35,6 +35,8 @@ use crate::math::INV_PI;
 use crate::shared::shared;
 
 shared! {
+    /// GGX alpha under which a surface that has no other lobes counts as polished: roughness 0.3. Lamps in it are found from their side.
+    pub const POLISHED_ALPHA: f32 = 0.09;
     /// Reflectance of the clearcoat, index 1.5, at normal incidence.
     const COAT_F0: f32 = 0.04;
     const LARGEST_BELOW_1: f32 = 0.999_999_94;
@@ -268,6 +270,13 @@ fn transmit_straight(s: &Surface, wo: Vec3) -> Vec3 {
     let fresnel = fresnel_dielectric(cos, index);
     let wi = refract_about(wo, s.ns, cos, index, fresnel.g);
     on_side(s.ng, -1.0, unit(wi))
+}
+
+/// Nothing but lobes that mirror or bend light with little blur.
+pub fn lobes_are_polished(s: &Surface) -> bool {
+    max3(diffuse_color(s)) == 0.0
+        && s.ggx_alpha < POLISHED_ALPHA
+        && (s.clearcoat == 0.0 || s.coat_alpha < POLISHED_ALPHA)
 }
 
 /// Nothing but delta lobes.

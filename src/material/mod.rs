@@ -16,9 +16,11 @@ mod tests;
 pub(crate) mod texture;
 
 pub use bsdf::{
-    bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian,
-    bsdf_sample,
+    bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_index_ratio, bsdf_is_delta,
+    bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample,
 };
+pub use interface::{DELTA_ALPHA, transmits_unblurred};
+pub use lobes::POLISHED_ALPHA;
 pub use scatter::{BsdfEval, BsdfSample};
 pub use surface::{Surface, surface_alpha, surface_at, triangle_emission};
 pub use texture::{srgb_decode, texture_sample};

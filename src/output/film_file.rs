@@ -8,7 +8,7 @@ use super::ChannelFile;
 use super::exr_file::{Channels, push_channel, write_layers};
 use super::film_note::{FORM, FilmNote, NOTE, NOTE_OF_FORM_1};
 use super::{Metadata, OutputError, Target};
-use crate::film::{Film, GuideSums, Picture, PixelSums, Planes, Sum3};
+use crate::film::{Film, GuideSums, Picture, PixelSums, Planes, SplatSums, Sum3};
 use crate::refusal::Refusal;
 
 /// As [`super::write_exr`], with the film's sums and what they are a part of.
@@ -39,6 +39,12 @@ pub fn write_film(
         }
         let hits: Vec<u32> = film.guides.iter().map(|g| g.hits).collect();
         push_channel(&mut channels, GUIDE_HITS, hits);
+    }
+    if !film.splats.is_empty() {
+        for (name, get, _) in splat_fields() {
+            let samples = film.splats.iter().map(get).collect::<Vec<u32>>();
+            push_channel(&mut channels, &name, samples);
+        }
     }
     let text = note.to_text(folder_of(target.path()));
     write_layers(
@@ -86,6 +92,7 @@ fn film_of(file: &ChannelFile, note: &FilmNote) -> Result<Film, String> {
         first_sample: note.range.0,
         pixels: vec![PixelSums::zeroed(); count],
         guides: Vec::new(),
+        splats: Vec::new(),
     };
     for (name, _, set) in float_fields() {
         fill(&mut film.pixels, finite(file, &name)?, set);
@@ -99,6 +106,13 @@ fn film_of(file: &ChannelFile, note: &FilmNote) -> Result<Film, String> {
         fill(&mut film.guides, hits, |guide, hits| guide.hits = hits);
         for (name, _, set) in guide_fields() {
             fill(&mut film.guides, finite(file, &name)?, set);
+        }
+    }
+    if splat_fields().any(|(name, _, _)| file.counts.contains_key(&name)) {
+        film.set_photons(true);
+        for (name, _, set) in splat_fields() {
+            let samples = file.counts.get(&name).ok_or_else(|| missing(&name))?;
+            fill(&mut film.splats, samples, set);
         }
     }
     Ok(film)
@@ -135,6 +149,40 @@ const GUIDE_HITS: &str = "sums.hits.Y";
 
 /// A channel's name, and how its samples are read from and written to a record.
 type Field<R, T, N> = (N, Box<dyn Fn(&R) -> T>, Box<dyn Fn(&mut R, T)>);
+
+/// What photons brought, each number as a low and a high word.
+fn splat_fields() -> impl Iterator<Item = Field<SplatSums, u32, String>> {
+    const SUMS: usize = size_of::<SplatSums>() / size_of::<u64>();
+    const NAMES: [&str; SUMS] = [
+        "diff.R",
+        "diff.G",
+        "diff.B",
+        "m_im.R",
+        "m_im.G",
+        "m_im.B",
+        "sq.R",
+        "sq.G",
+        "sq.B",
+        "photons.Y",
+    ];
+    let word = |at: usize, shift: u32| -> Field<SplatSums, u32, String> {
+        let (sum, axis) = NAMES[at].split_once('.').unwrap_or((NAMES[at], "Y"));
+        let part = if shift == 0 { "lo" } else { "hi" };
+        (
+            format!("splats.{sum}.{part}.{axis}"),
+            Box::new(move |sums| (splat_words(sums)[at] >> shift) as u32),
+            Box::new(move |sums, bits| {
+                let word: &mut [u64; SUMS] = bytemuck::cast_mut(sums);
+                word[at] |= u64::from(bits) << shift;
+            }),
+        )
+    };
+    (0..SUMS).flat_map(move |at| [word(at, 0), word(at, 32)])
+}
+
+fn splat_words(sums: &SplatSums) -> [u64; size_of::<SplatSums>() / size_of::<u64>()] {
+    bytemuck::cast(*sums)
+}
 
 /// Six channels of three double-floats.
 fn sum3_fields<R: 'static>(

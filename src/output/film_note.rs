@@ -38,7 +38,7 @@ pub(super) const NOTE: &str = "mixray.film";
 /// The attribute that films of the first form had.
 pub(super) const NOTE_OF_FORM_1: &str = "mixray.film.version";
 /// The form of note and channels that this program writes and reads.
-pub(super) const FORM: u32 = 2;
+pub(super) const FORM: u32 = 3;
 
 #[derive(Serialize)]
 struct WrittenNote<'a> {

@@ -6,6 +6,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use super::camera::frame_camera;
 use super::lights::pack_lights;
+use super::photons::traced_environment;
 use crate::accel::{AccelError, Cover, WorldBvh};
 use crate::light::environment_table::environment_table;
 use crate::packed::materials::{MaterialKey, MaterialTable};
@@ -99,6 +100,7 @@ impl PackedScene {
         };
         let corners = self.corners(first as usize);
         self.resting_cover = Cover::of(&corners, MAX_SPHERES);
+        self.resting_smooth_cover = self.cover_smooth(first as usize..self.triangles.len());
         self.virtual_bvh = WorldBvh::build(&corners, first)?;
         self.rebuild_moving(scene)
     }
@@ -117,6 +119,7 @@ impl PackedScene {
             .any(|m| m.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0);
         self.frame.flags = self.frame.flags & !FRAME_ALPHA | if alpha { FRAME_ALPHA } else { 0 };
         pack_lights(self, scene);
+        self.pack_photons();
         Ok(())
     }
 
@@ -152,6 +155,7 @@ impl PackedScene {
             &mut self.frame,
         );
         self.frame.flags &= !(FRAME_SHUTTER | FRAME_SHUTTER_ORDERED);
+        (self.frame.shutter_open, self.frame.shutter_row) = (1.0, 0.0);
         let count = scene.camera.width as usize * scene.camera.height as usize;
         self.pixels = vec![PixelInfo::uniform(PIXEL_BEAM_MAY_MEET_VIRTUAL); count];
     }
@@ -206,6 +210,13 @@ impl PackedScene {
                 self.frame.env_height = *height;
                 self.frame.env_radiance = [scale, scale, scale, table.normaliser];
                 self.env_mean_luminance = table.mean_luminance * environment.scale;
+                self.env_traced = traced_environment(
+                    *width,
+                    *height,
+                    &self.env_texels,
+                    environment.scale,
+                    self.env_mean_luminance,
+                );
                 self.env_cdf = table.cdf;
             }
         }

@@ -106,7 +106,8 @@ fn blank(kind: u32, side: u32) -> Light {
         alias_threshold: 1.0,
         alias_light: NONE,
         triangle: NONE,
-        pad: [0; 2],
+        photon_pdf: 0.0,
+        photon_cdf: 0.0,
     }
 }
 

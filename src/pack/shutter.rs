@@ -29,8 +29,13 @@ impl PackedScene {
     pub fn set_shutter(&mut self, scene: &Scene, objects_move: bool) {
         self.frame.flags &= !(FRAME_SHUTTER | FRAME_SHUTTER_ORDERED);
         let Some(shutter) = traced_shutter(scene) else {
+            (self.frame.shutter_open, self.frame.shutter_row) = (1.0, 0.0);
             return;
         };
+        let open = shutter.open_share();
+        let rows = f64::from(scene.camera.height.max(2) - 1);
+        self.frame.shutter_open = open as f32;
+        self.frame.shutter_row = ((1.0 - open) / rows) as f32;
         let (opens, closes) = shutter.interval_secs();
         let steps = (SHUTTER_POSES - 1) as f64;
         let at = |i: usize| {
@@ -41,10 +46,6 @@ impl PackedScene {
         if !frame_poses(&poses, DVec3::from(self.anchor_m), &mut self.frame) {
             return;
         }
-        let open = shutter.open_share();
-        let rows = f64::from(scene.camera.height.max(2) - 1);
-        self.frame.shutter_open = open as f32;
-        self.frame.shutter_row = ((1.0 - open) / rows) as f32;
         self.frame.flags |= FRAME_SHUTTER;
         // The others stratify pairs of numbers, not a single one.
         if objects_move || scene.settings.sampler != SamplerKind::Sobol {

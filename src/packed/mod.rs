@@ -45,7 +45,21 @@ pub struct PackedScene {
     pub(crate) resting: Resting,
     /// Over the virtual triangles that rest.
     pub(crate) resting_cover: Cover,
+    /// Over those of them that are smooth.
+    pub(crate) resting_smooth_cover: Cover,
     pub(crate) env_mean_luminance: f64,
+    pub(crate) env_traced: TracedEnvironment,
+    /// Photons traced for every ray per pixel; 0 where none are.
+    pub photons_per_ray: u64,
+}
+
+/// The part of the environment that photons bring.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TracedEnvironment {
+    /// Luminance.
+    pub above: f64,
+    /// Luminance of what lies above it, mean over the sphere.
+    pub mean_radiance: f64,
 }
 
 /// How many of a scene's triangles and vertices rest: those of animated virtual objects come after them.
@@ -79,7 +93,10 @@ impl PackedScene {
             real_vertex_count: 0,
             resting: Resting::default(),
             resting_cover: Cover::of(&[], MAX_SPHERES),
+            resting_smooth_cover: Cover::of(&[], MAX_PHOTON_SPHERES),
             env_mean_luminance: 0.0,
+            env_traced: TracedEnvironment::default(),
+            photons_per_ray: 0,
         }
     }
 }

@@ -10,6 +10,9 @@ shared! {
     /// Bounding spheres of the virtual geometry, at most this many.
     pub const MAX_SPHERES: usize = 16;
 
+    /// Spheres that photons are sent to, at most this many.
+    pub const MAX_PHOTON_SPHERES: usize = 8;
+
     /// Camera poses at equal steps of the time for which the shutter is open, the first and the last moment included.
     pub const SHUTTER_POSES: usize = 9;
 
@@ -72,11 +75,19 @@ shared! {
         pub shutter_row: f32,
         /// Share of that time for which each row is open.
         pub shutter_open: f32,
-        pub pad: f32,
+        /// Luminance of the environment above which photons bring its light through smooth virtual objects; what is under it is left to
+        /// the eye's paths. Infinity: all is.
+        pub env_traced_above: f32,
         /// Bounding spheres of the virtual geometry: centre, radius.
         pub spheres: [[f32; 4]; MAX_SPHERES],
         /// Anchor-relative position (w unused) and unit quaternion x, y, z, w of each pose.
         pub shutter_poses: [[f32; 4]; 2 * SHUTTER_POSES],
+        /// Bounding spheres of what photons are sent to, virtual surfaces that mirror or refract: centre, radius.
+        pub photon_spheres: [[f32; 4]; MAX_PHOTON_SPHERES],
+        /// 0: no photons are traced.
+        pub photon_sphere_count: u32,
+        pub pad: u32,
+        pub pad_end: [u32; 2],
     }
 
     pub const APERTURE_DISC: u32 = 0;
@@ -109,7 +120,9 @@ shared! {
     /// Without the saving `last-vertex`: every last vertex looks for light, as if `FRAME_LIGHTS_SUFFICE` were not.
     pub const FRAME_NO_LAST_VERTEX: u32 = 256;
     /// Without the saving `sharing`. No shader reads it.
-    pub const FRAME_NO_SHARING: u32 = 512;
+    pub const FRAME_NO_SHARING: u32 = 1024;
+    /// Without the saving `photons`: the eye's paths look for caustics.
+    pub const FRAME_NO_PHOTONS: u32 = 512;
 
     #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
     pub struct Vertex {
@@ -205,7 +218,10 @@ shared! {
         pub alias_light: u32,
         /// Global triangle id for LIGHT_TRIANGLE, else NONE.
         pub triangle: u32,
-        pub pad: [u32; 2],
+        /// Probability that a photon starts from this light, and that it starts from this or one before it in the list; all 0 where the
+        /// eye's paths find what the light sends through smooth virtual objects.
+        pub photon_pdf: f32,
+        pub photon_cdf: f32,
     }
 
     /// The lens beam of this pixel may meet virtual geometry.

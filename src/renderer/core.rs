@@ -13,7 +13,7 @@ use crate::gpu::GpuError;
 use crate::pack::PackError;
 use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
 use crate::scene::{Composite, Scene};
-use crate::work::{Meter, Phase, Progress, RayCounts, Watcher, WorkList};
+use crate::work::{Meter, Phase, PhotonWork, Progress, RayCounts, Watcher, WorkList};
 
 pub(super) struct Core {
     pub scene: Scene,
@@ -63,10 +63,7 @@ impl Core {
         if let Some(gpu) = self.backend.gpu_mut() {
             match gpu.render(&mut self.film, work, &mut self.rays, watcher) {
                 Err(error @ GpuError::Lost(_)) => {
-                    self.notes.push(format!(
-                        "{error}; the CPU goes on from what was accumulated"
-                    ));
-                    self.backend = Backend::Cpu;
+                    self.replace_device(&error);
                     let left = work.left(&self.film);
                     self.rays += cpu::render::render(&self.packed, &mut self.film, &left, watcher);
                     return Ok(());
@@ -76,6 +73,53 @@ impl Core {
         }
         self.rays += cpu::render::render(&self.packed, &mut self.film, work, watcher);
         Ok(())
+    }
+
+    /// Traces the photons of the rays per pixel before `end` that the film lacks; fewer if the watcher ends it.
+    pub fn take_photons(&mut self, end: u32, watcher: &Watcher<'_>) -> Result<(), RenderError> {
+        let end = u64::from(end) * self.packed.photons_per_ray;
+        self.take_photons_of(end, [0.0, 1.0], watcher)
+    }
+
+    /// The same, of the photons numbered below `end`, which fly in a part of the shutter's time: its beginning and length. A device that is lost is
+    /// replaced by the CPU.
+    pub fn take_photons_of(
+        &mut self,
+        end: u64,
+        window: [f32; 2],
+        watcher: &Watcher<'_>,
+    ) -> Result<(), RenderError> {
+        let Some(work) = self.lacking_photons(end, window) else {
+            return Ok(());
+        };
+        if let Some(gpu) = self.backend.gpu_mut() {
+            match gpu.trace_photons(&mut self.film, &work, &mut self.rays, watcher) {
+                Err(error @ GpuError::Lost(_)) => self.replace_device(&error),
+                other => return Ok(other?),
+            }
+        }
+        if let Some(work) = self.lacking_photons(end, window) {
+            self.rays += cpu::photons::render::render(&self.packed, &mut self.film, &work, watcher);
+        }
+        Ok(())
+    }
+
+    pub fn lacks_photons(&self, end: u64) -> bool {
+        self.lacking_photons(end, [0.0, 1.0]).is_some()
+    }
+
+    fn lacking_photons(&self, end: u64, window: [f32; 2]) -> Option<PhotonWork> {
+        let film = &self.film;
+        let first = u64::from(film.first_sample) * self.packed.photons_per_ray + film.photons();
+        let is_lacking = !film.splats.is_empty() && first < end;
+        is_lacking.then_some(PhotonWork { first, end, window })
+    }
+
+    fn replace_device(&mut self, error: &GpuError) {
+        self.notes.push(format!(
+            "{error}; the CPU goes on from what was accumulated"
+        ));
+        self.backend = Backend::Cpu;
     }
 
     /// The samples of the main pass that lie before `end_of_row`, in rays per pixel.

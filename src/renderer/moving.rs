@@ -25,16 +25,21 @@ impl Moving {
         watcher: &Watcher<'_>,
     ) -> Result<(), RenderError> {
         let mut way = Way::to(end_of_all, core, watcher);
+        let mut opened = 0.0;
         for instant in &self.instants {
             if watcher.is_cancelled() {
                 break;
             }
             let ends = ends_of(core, instant);
             let work = core.main_work(|row| ends[row].min(end));
-            if work.is_empty() {
+            let photons = photons_end(core, instant, end);
+            let window = [opened as f32, (instant.end_share - opened) as f32];
+            opened = instant.end_share;
+            if work.is_empty() && !core.lacks_photons(photons) {
                 continue;
             }
             stand_at(core, instant)?;
+            core.take_photons_of(photons, window, watcher)?;
             if !way.take(core, &work)? {
                 break;
             }
@@ -64,6 +69,14 @@ impl Moving {
         core.scene.set_time(core.time_secs);
         Ok(())
     }
+}
+
+/// The photons before the end of an instant, of those that belong to the rays per pixel before `end`: their numbers follow one another in time.
+fn photons_end(core: &Core, instant: &Instant, end: u32) -> u64 {
+    let each = core.packed.photons_per_ray;
+    let all = u64::from(core.scene.settings.rays_per_pixel) * each;
+    let before = (instant.end_share.min(1.0) * all as f64 + 0.5).floor() as u64;
+    before.min(u64::from(end) * each)
 }
 
 /// By row, the samples before the end of an instant, in rays per pixel.

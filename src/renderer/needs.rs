@@ -1,6 +1,7 @@
 //! What a render will take, held against the memory that there is before it is taken.
 
-use crate::film::{GuideSums, PixelSums};
+use crate::cpu::contribution::photons_traced;
+use crate::film::{GuideSums, PixelSums, SplatSums};
 use crate::memory::{Shortage, ensure, ensure_lazy};
 use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
 use crate::scene::{EnvironmentMap, Scene};
@@ -45,8 +46,12 @@ pub(super) fn ensure_film(packed: &PackedScene, all_planes: bool) -> Result<(), 
         .filter(|pixel| pixel.flags & PIXEL_OUT_OF_REACH == 0)
         .count() as u64;
     let (width, height) = (packed.frame.width, packed.frame.height);
-    let mapped = packed.pixels.len() as u64 * film_bytes(all_planes);
-    let touched = within_reach * film_bytes(all_planes);
+    let splats = match photons_traced(&packed.frame) {
+        true => packed.pixels.len() as u64 * size_of::<SplatSums>() as u64,
+        false => 0,
+    };
+    let mapped = packed.pixels.len() as u64 * film_bytes(all_planes) + splats;
+    let touched = within_reach * film_bytes(all_planes) + splats;
     ensure_lazy(mapped, touched, &picture(width, height))
 }
 

@@ -108,6 +108,7 @@ impl Renderer {
         );
         let factors = core.packed.pixels.iter().map(|p| p.sample_factor);
         core.film.set_sample_factors(factors);
+        core.film.set_photons(core.packed.photons_per_ray > 0);
         if core.options.filter {
             self.surfaces = cpu::diffuse_surfaces(&core.packed);
         }

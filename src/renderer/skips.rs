@@ -2,8 +2,8 @@
 
 use super::ErrorGoal;
 use crate::packed::{
-    FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, FRAME_NO_SHARING, Frame,
-    PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PixelInfo,
+    FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, FRAME_NO_PHOTONS, FRAME_NO_SHARING,
+    Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PixelInfo,
 };
 use crate::scene::{Choice, Estimator};
 
@@ -28,6 +28,9 @@ pub enum Skip {
     Sharing,
     /// Where a few lights are all the light there is, a diffuse last vertex leaves all to its shadow ray. The expectation is the same.
     LastVertex,
+    /// Caustics of smooth virtual objects come as photons from the lights; without them the eye's paths look for them, and those of lights without
+    /// size stay dark. The expectation is the same but for those.
+    Photons,
     /// Shaders hold the code that the scene needs and no more (GPU). The result is the same to rounding.
     Specialisation,
     /// With a goal, each tile takes the samples that it needs; without, every tile those of the neediest. Both reach the goal.
@@ -47,6 +50,7 @@ impl Choice for Skip {
         ("cones", Self::Cones),
         ("sharing", Self::Sharing),
         ("last-vertex", Self::LastVertex),
+        ("photons", Self::Photons),
         ("specialisation", Self::Specialisation),
         ("adaptive", Self::Adaptive),
         ("camera-noise", Self::CameraNoise),
@@ -93,7 +97,8 @@ impl Without {
             | Skip::EdgeReal
             | Skip::Cones
             | Skip::Sharing
-            | Skip::LastVertex => true,
+            | Skip::LastVertex
+            | Skip::Photons => true,
         })
     }
 
@@ -124,6 +129,7 @@ impl Without {
             | Skip::Cones
             | Skip::Sharing
             | Skip::LastVertex
+            | Skip::Photons
                 if estimator == Estimator::Paper =>
             {
                 Some("the estimator is paper")
@@ -148,6 +154,7 @@ impl Without {
             (Skip::Cones, FRAME_NO_CONES),
             (Skip::LastVertex, FRAME_NO_LAST_VERTEX),
             (Skip::Sharing, FRAME_NO_SHARING),
+            (Skip::Photons, FRAME_NO_PHOTONS),
         ] {
             if self.contains(skip) {
                 frame.flags |= flag;

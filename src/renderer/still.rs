@@ -18,6 +18,7 @@ pub(super) fn advance(
     let mut way = Way::to(end_of_all, core, watcher);
     while first + way.samples < end {
         let next = end.min(first + way.samples + way.samples.clamp(1, MAX_PASS_SAMPLES));
+        core.take_photons(next, watcher)?;
         let work = core.main_work(|_| next);
         if !way.take(core, &work)? {
             break;

@@ -2,9 +2,11 @@
 //! [`WorkList`] and fills it into the film, whatever it was made for.
 
 pub(crate) mod list;
+mod photons;
 pub(crate) mod rays;
 mod watcher;
 
 pub use list::{Pass, PixelWork, WorkList};
+pub use photons::PhotonWork;
 pub use rays::{RayCounts, SampleRays};
 pub use watcher::{Meter, Phase, Progress, Watcher};

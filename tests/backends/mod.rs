@@ -3,6 +3,7 @@
 mod agreement;
 mod assets;
 mod device;
+mod photons;
 mod scenes;
 
 use mixray::gpu::{Features, GpuBackend, harness::test_device};

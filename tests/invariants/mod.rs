@@ -9,6 +9,7 @@ mod furnace;
 mod lens;
 mod perfect_proxy;
 mod photograph;
+mod photons;
 mod repeatability;
 mod savings;
 mod stated_error;

@@ -7,7 +7,7 @@ use super::support::*;
 
 const RAYS: u32 = 20;
 
-/// Defocused edges in front of a wall, so that edge pixels are replayed.
+/// Defocused edges in front of a wall, so that edge pixels are replayed, and a mirror, so that photons are traced.
 fn defocused() -> Scene {
     let mut scene = scene(&format!(
         r#"{CAMERA}{TABLE}{LAMP}
@@ -24,6 +24,13 @@ segments = 24
 scale = 0.35
 translation = [0.1, 0.35, 0]
 material = {{ base_color = [0.8, 0.5, 0.3], roughness = 0.3 }}
+
+[[virtual]]
+shape = "sphere"
+segments = 24
+scale = 0.15
+translation = [-0.4, 0.15, 0.3]
+material = {{ metallic = 1.0, roughness = 0.0 }}
 "#
     ));
     scene.settings.rays_per_pixel = RAYS;

@@ -12,6 +12,8 @@ mod measurement;
 
 use rayon::prelude::*;
 
+use super::contribution::photons_traced;
+use super::photons::plan::{EyeMoments, photons_per_ray, unmeasured};
 use allocation::{Rates, allocate};
 use beam::Beam;
 use blocks::Blocks;
@@ -47,6 +49,7 @@ pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
     let nothing_virtual = scene.frame.sphere_count == 0
         && scene.swept_spheres.is_empty()
         && !scene.lights.iter().any(|l| l.side == SIDE_VIRTUAL);
+    scene.photons_per_ray = 0;
     if nothing_virtual {
         scene.pixels = vec![PixelInfo::uniform(PIXEL_OUT_OF_REACH); width * height];
         return;
@@ -64,6 +67,9 @@ pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
             flags_of(scene, &Beam::of_pixel(&scene.frame, &pinhole, i as u32))
         })
         .collect();
+    if photons_traced(&scene.frame) {
+        scene.photons_per_ray = unmeasured(width * height);
+    }
     if scene.frame.estimator == ESTIMATOR_PAPER {
         scene.pixels = flags.into_iter().map(PixelInfo::uniform).collect();
         return;
@@ -91,11 +97,8 @@ pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
             .map(|&importance| Rates::from_importance(importance))
             .collect()
     } else {
-        allocate(
-            &blocks,
-            &measure(scene, &blocks, &flags, meter),
-            &importances,
-        )
+        let measured = measure(scene, &blocks, &flags, meter);
+        allocate(&blocks, &measured, &importances)
     };
     scene.pixels = (0..flags.len())
         .map(|pixel| rates[blocks.of_pixel(pixel)].pixel(flags[pixel]))
@@ -167,8 +170,25 @@ fn measure(
         .map(|flags| PixelInfo::uniform(flags | shares))
         .collect();
     let measured = measurement::measure(scene, blocks, || meter.add(STEPS_OF_A_BLOCK));
+    if photons_traced(&scene.frame) {
+        scene.photons_per_ray = photons_per_ray(scene, eye_moments(blocks, &measured));
+    }
     scene.frame = frame;
     measured
+}
+
+/// What a sample in every pixel does.
+fn eye_moments(blocks: &Blocks, measured: &[measurement::BlockMoments]) -> EyeMoments {
+    let mut sum = EyeMoments::default();
+    for (block, moments) in measured.iter().enumerate() {
+        let sampled = moments.difference.pixels + moments.mixed.pixels;
+        if sampled > 0.0 {
+            let share = blocks.pixels(block).count() as f64 / f64::from(sampled);
+            sum.error += share * f64::from(moments.difference.error + moments.mixed.error);
+            sum.cost += share * f64::from(moments.difference.cost + moments.mixed.cost);
+        }
+    }
+    sum
 }
 
 #[cfg(test)]

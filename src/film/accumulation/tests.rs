@@ -113,6 +113,9 @@ fn ranges_that_do_not_fit_are_refused() {
         film.merge(&Film::new(3, 1, 4, false)),
         Err(MergeError::Guides)
     );
+    let mut with_photons = Film::new(3, 1, 4, true);
+    with_photons.set_photons(true);
+    assert_eq!(film.merge(&with_photons), Err(MergeError::Photons));
     assert_eq!(film, before);
 }
 

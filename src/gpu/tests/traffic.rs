@@ -10,6 +10,8 @@ use crate::gpu::{Composer, Features};
 
 const DOC: &str = include_str!("../../../docs/architecture.md");
 const LANE: u32 = 4;
+/// What a first vertex remembers while a point's light is captured.
+const CAPTURE: u32 = 16;
 
 /// The largest variants: `direct`, with second vertices shared and without, and `paper`.
 const SHARING: Features = Features {
@@ -57,7 +59,6 @@ fn rows(size: &BTreeMap<String, u32>) -> Vec<String> {
         difference,
         result,
         first,
-        capture,
         points,
     ] = [
         "path_rays",
@@ -68,7 +69,6 @@ fn rows(size: &BTreeMap<String, u32>) -> Vec<String> {
         "path_differences",
         "path_results",
         "path_firsts",
-        "path_captures",
         "path_points",
     ]
     .map(|part| size[part]);
@@ -100,7 +100,7 @@ fn rows(size: &BTreeMap<String, u32>) -> Vec<String> {
         row("to keep a first vertex, beside", (0, first)),
         row(
             "to offer a point, beside",
-            (result, points / POINTS + capture + result),
+            (result, points / POINTS + CAPTURE + result),
         ),
     ]
 }

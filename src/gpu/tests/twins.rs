@@ -41,6 +41,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ),
     ("cpu::vertex", "max_element", "glam has it"),
     (
+        "cpu::photons::emission",
+        "no_emission",
+        "a constant in Rust",
+    ),
+    (
         "cpu::estimator",
         "is_without_turn",
         "the host counts what it need not send",
@@ -134,6 +139,11 @@ const OTHER_ARGUMENTS: &[(&str, &str, &str)] = &[
         "the CPU passes the members of a tile and what they have; a lane finds them",
     ),
     (
+        "cpu::photons::path",
+        "trace_photon",
+        "a shader lists splats itself",
+    ),
+    (
         "film::sums",
         "two_sum sum_add sum3_add pixel_add pixel_add_real guide_add",
         "`zero` hides intermediate sums from shader compilers",
@@ -186,7 +196,7 @@ const OTHER_ARGUMENTS: &[(&str, &str, &str)] = &[
 ];
 
 /// Where kernels begin: the Rust twin is their host, which calls them by name.
-const KERNEL_MODULES: &[&str] = &["gpu::kernels", "::gpu"];
+const KERNEL_MODULES: &[&str] = &["gpu::kernels", "gpu::photons", "::gpu"];
 
 fn is_kernel_module(module: &str) -> bool {
     KERNEL_MODULES

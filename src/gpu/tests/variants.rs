@@ -256,7 +256,15 @@ const TRACES: &[Trace] = &[
             "fn cpu_points__keep_first_vertex",
             "fn cpu_points__offer_point",
             "cpu_state__path_points",
-            "cpu_state__path_captures",
+        ],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "photons",
+        with: &[
+            "fn cpu_contribution__left_to_photons",
+            "fn cpu_contribution__events_after",
+            "fn cpu_vertex__light_left_to_eye",
         ],
         ..ADVANCE
     },

@@ -1,5 +1,5 @@
 use super::*;
-use crate::film::{Sample, guide_add, planes};
+use crate::film::{Sample, Splat, guide_add, planes};
 use crate::output::film_note::tests::note;
 use crate::scene::{Camera, Composite, Estimator, SamplerKind};
 use glam::Vec3;
@@ -23,6 +23,13 @@ fn film() -> Film {
             }
         }
     }
+    film.set_photons(true);
+    let splats = (0..60).map(|i| Splat {
+        pixel: i % 5,
+        is_virtual: i % 3 == 0,
+        value: Vec3::new(i as f32, 1e6, 1e-6 * i as f32),
+    });
+    film.add_splats((1 << 33) + 5, splats);
     film
 }
 
@@ -72,6 +79,7 @@ fn a_film_survives_its_file_bit_for_bit() {
 
     let mut plain = film.clone();
     plain.guides.clear();
+    plain.set_photons(false);
     let (_folder, target) = written(&plain);
     assert_eq!(read_film(target.path()).unwrap().0, plain);
 }

@@ -50,8 +50,8 @@ fn notes_that_this_program_did_not_write_are_refused() {
     let read = |text: &str| FilmNote::from_text(text, Path::new("."));
     assert_eq!(read(&text), Ok(note()), "control");
     for (from, to, part) in [
-        ("\"form\":2", "\"form\":3", "form 3; expected form 2"),
-        ("\"form\":2,", "", "missing field `form`"),
+        ("\"form\":3", "\"form\":4", "form 4; expected form 3"),
+        ("\"form\":3,", "", "missing field `form`"),
         ("\"paper\"", "\"papers\"", "\"papers\" is not known"),
         ("plan", "plans", "plans"),
         ("[7,47]", "[47,7]", "rays 47..7 of 100"),

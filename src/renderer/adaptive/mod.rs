@@ -93,6 +93,10 @@ impl Renderer {
             begin: stopwatch.begin,
             done: 0,
             expected: 2 * TRIAL_SCRAMBLES + SCRAMBLES,
+            planned: (
+                core.packed.photons_per_ray,
+                evaluations(&core.packed.pixels),
+            ),
             core,
         };
         let outcome = driver.pilot_and_picture();
@@ -124,6 +128,8 @@ pub(super) struct ToError<'a> {
     pub done: u32,
     pub expected: u32,
     goal: ErrorGoal,
+    /// Photons for every ray per pixel of the pilot's plan, and that plan's evaluations, all pixels together.
+    planned: (u64, f64),
 }
 
 impl ToError<'_> {
@@ -303,6 +309,14 @@ impl ToError<'_> {
         self.core.film = series.sum.into_film();
         stated
     }
+}
+
+/// Evaluations for every ray per pixel, all pixels together.
+fn evaluations(infos: &[PixelInfo]) -> f64 {
+    let reached = infos.iter().filter(|info| is_within_reach(info));
+    reached
+        .map(|info| f64::from(info.sample_factor) / f64::from(info.difference_period))
+        .sum()
 }
 
 /// Samples of a pixel within reach, on average.

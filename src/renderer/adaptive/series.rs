@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::ToError;
+use super::{ToError, evaluations};
 use crate::film::Scrambles;
 use crate::gpu::Changed;
 use crate::math::hash_combine;
@@ -36,6 +36,10 @@ impl ToError<'_> {
         for (info, known) in infos.iter_mut().zip(&core.packed.pixels) {
             info.flags |= known.flags & PIXEL_EDGE;
         }
+        // As many times the photons as the evaluations.
+        let (photons, planned) = self.planned;
+        let gain = evaluations(&infos) / planned.max(1e-30);
+        core.packed.photons_per_ray = (photons as f64 * gain).ceil() as u64;
         core.packed.pixels = infos;
         let factors = core.packed.pixels.iter().map(|info| info.sample_factor);
         core.film.set_sample_factors(factors);
@@ -128,6 +132,7 @@ impl ToError<'_> {
         core.packed.frame.seed = hash_combine(core.scene.settings.seed ^ SEED_SALT, number);
         core.backend.set_frame(&core.packed);
         core.film.clear();
+        core.take_photons(1, watcher)?;
         let work = core.main_work(|_| 1);
         let share_at_end = f64::from(self.done + 1) / f64::from(self.expected.max(self.done + 1));
         let meter = Meter::part(watcher, from, share_at_end, work.samples());

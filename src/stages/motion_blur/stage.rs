@@ -37,10 +37,10 @@ fn run(shot: &mut Shot, gpu: Option<&GpuStages>) -> Result<(), GpuError> {
         })
         .collect();
     let photo = shot.scene.photo.as_ref();
-    let mut canvas: Vec<[f32; 4]> = (film.pixels.iter().enumerate())
-        .map(|(pixel, sums)| {
+    let mut canvas: Vec<[f32; 4]> = (0..film.pixels.len())
+        .map(|pixel| {
             let ic = photo.map_or([0.0; 3], |photo| photo.linear[pixel]);
-            let [r, g, b] = background_pixel(sums, ic, shot.scene.settings.composite);
+            let [r, g, b] = background_pixel(&film.sums(pixel), ic, shot.scene.settings.composite);
             [r, g, b, 0.0]
         })
         .collect();
@@ -113,13 +113,14 @@ fn spread(objects: &[u32], film: &Film) -> Vec<u32> {
 }
 
 fn layer_of(film: &Film, owners: &[u32], object: u32) -> Vec<[f32; 4]> {
-    let pixels = film.pixels.iter().zip(owners);
+    let pixels = owners.iter().enumerate();
     pixels
-        .map(|(sums, owner)| {
+        .map(|(pixel, owner)| {
+            let sums = film.sums(pixel);
             if sums.m == 0 || *owner != object {
                 return [0.0; 4];
             }
-            let means = Means::of(sums);
+            let means = Means::of(&sums);
             let colour = means.m_im.as_vec3();
             colour.extend(means.mask as f32).to_array()
         })

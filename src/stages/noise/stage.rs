@@ -62,11 +62,12 @@ fn ratio(film: &Film, composite: Composite) -> Option<Vec<[f32; 3]>> {
     if composite == Composite::Additive {
         return None;
     }
-    let ratios = film.pixels.iter().map(|sums| {
+    let ratios = (0..film.pixels.len()).map(|pixel| {
+        let sums = film.sums(pixel);
         if sums.n == 0 || sums.n_real == 0 {
             return [1.0; 3];
         }
-        let ratio = Means::of(sums).quotient().max(glam::DVec3::ZERO);
+        let ratio = Means::of(&sums).quotient().max(glam::DVec3::ZERO);
         ratio.as_vec3().to_array()
     });
     Some(ratios.collect())

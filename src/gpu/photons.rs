@@ -1,0 +1,206 @@
+//! Photons on the device: one an invocation, from its light to its end. Their splats come back as a list, which the host adds up in fixed point: the
+//! order in which they were listed leaves no trace.
+
+use std::time::Instant;
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::kernel::{BindGroups, Kernel};
+use super::{Composer, Features, GpuDevice, GpuError, SceneBuffers};
+use crate::cpu::photons::path::SEQUENCE_BITS;
+use crate::film::{Film, Splat};
+use crate::shared::{WORKGROUP, shared};
+use crate::work::{PhotonWork, RayCounts, Watcher};
+
+shared! {
+    /// Uniform of a batch of photons of one sequence.
+    #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+    pub struct PhotonBatch {
+        pub sequence: u32,
+        /// Place of the first photon.
+        pub first: u32,
+        pub count: u32,
+        /// Room in the list.
+        pub most_splats: u32,
+        /// When they fly, as shares of the shutter's time.
+        pub window_begin: f32,
+        pub window_length: f32,
+        pub pad: [u32; 2],
+    }
+
+    /// What a photon brings to a pixel.
+    #[derive(Clone, Copy, Debug, Pod, Zeroable)]
+    pub struct ListedSplat {
+        pub value: Vec3,
+        /// Twice the pixel's index, plus 1 if it comes from a virtual surface.
+        pub place: u32,
+    }
+
+    /// Splats, mixed rays, mixed shadow rays.
+    const PHOTON_COUNTERS: u32 = 3;
+}
+
+const COUNTERS_BYTES: u64 = 4 * PHOTON_COUNTERS as u64;
+const SPLAT_BYTES: u64 = size_of::<ListedSplat>() as u64;
+/// Photons of the first submission, and of any.
+const FIRST_BATCH: u32 = 1 << 12;
+const LARGEST_BATCH: u32 = 1 << 18;
+/// Seconds that a submission should take: short enough for a desktop to stay responsive.
+const TARGET_SECS: f64 = 0.1;
+
+/// The photons' kernel with its buffers.
+pub struct Photons {
+    kernel: Kernel,
+    groups: BindGroups,
+    batch: wgpu::Buffer,
+    counters: wgpu::Buffer,
+    splats: wgpu::Buffer,
+    staging: wgpu::Buffer,
+    /// Photons that the next submission may have.
+    next_batch: u32,
+}
+
+impl Photons {
+    /// # Errors
+    /// As [`Kernel::new`].
+    pub fn new(
+        gpu: &GpuDevice,
+        composer: &Composer,
+        features: &Features,
+        scene: &SceneBuffers,
+    ) -> Result<Self, GpuError> {
+        use wgpu::BufferUsages as Usage;
+        let entry_point = "kernel_photons";
+        let wgsl = composer.compose("gpu::photons", entry_point, features)?;
+        let kernel = Kernel::new(gpu, entry_point, &wgsl)?;
+        let make = |label, size, usage| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let list = SPLAT_BYTES * u64::from(LARGEST_BATCH);
+        let filled = Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC;
+        let batch_bytes = size_of::<PhotonBatch>() as u64;
+        let batch = make(
+            "photon batch",
+            batch_bytes,
+            Usage::UNIFORM | Usage::COPY_DST,
+        );
+        let counters = make("photon counters", COUNTERS_BYTES, filled);
+        let splats = make("splats", list, Usage::STORAGE | Usage::COPY_SRC);
+        let read = Usage::MAP_READ | Usage::COPY_DST;
+        let staging = make("splats' staging", list.max(COUNTERS_BYTES), read);
+        let groups = kernel.bind(gpu, |name| match name {
+            "photon_batch" => Some(&batch),
+            "photon_counters" => Some(&counters),
+            "splats" => Some(&splats),
+            name => scene.get(name),
+        })?;
+        Ok(Self {
+            kernel,
+            groups,
+            batch,
+            counters,
+            splats,
+            staging,
+            next_batch: FIRST_BATCH,
+        })
+    }
+
+    /// Traces the photons of `work` and adds what they bring to the film, as [`crate::cpu::photons::render::render`] does.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`]: the film keeps what was finished before.
+    pub fn render(
+        &mut self,
+        gpu: &GpuDevice,
+        film: &mut Film,
+        work: &PhotonWork,
+        rays: &mut RayCounts,
+        watcher: &Watcher<'_>,
+    ) -> Result<(), GpuError> {
+        let mut first = work.first;
+        while first < work.end && !watcher.is_cancelled() {
+            let of_sequence = (1 << SEQUENCE_BITS) - (first & ((1 << SEQUENCE_BITS) - 1));
+            let count = of_sequence
+                .min(work.end - first)
+                .min(u64::from(self.next_batch));
+            let batch = PhotonBatch {
+                sequence: (first >> SEQUENCE_BITS) as u32,
+                first: (first & ((1 << SEQUENCE_BITS) - 1)) as u32,
+                count: count as u32,
+                most_splats: LARGEST_BATCH,
+                window_begin: work.window[0],
+                window_length: work.window[1],
+                pad: [0; 2],
+            };
+            let begin = Instant::now();
+            let [listed, mixed, mixed_shadow] = self.run(gpu, &batch)?;
+            if listed > LARGEST_BATCH {
+                // No room for all: again, fewer at a time.
+                self.next_batch = (self.next_batch / 2).max(WORKGROUP);
+                continue;
+            }
+            let list = self.list(gpu, listed)?;
+            film.add_splats(count, list.into_iter().map(Splat::from));
+            *rays += RayCounts {
+                mixed: mixed.into(),
+                mixed_shadow: mixed_shadow.into(),
+                ..RayCounts::default()
+            };
+            first += count;
+            let secs = begin.elapsed().as_secs_f64();
+            let room = u64::from(LARGEST_BATCH) * count / u64::from(2 * listed.max(1));
+            let affordable = (count as f64 * TARGET_SECS / secs.max(1e-6)) as u64;
+            let most = room.min(affordable).min(4 * u64::from(self.next_batch));
+            self.next_batch = most.clamp(u64::from(WORKGROUP), u64::from(LARGEST_BATCH)) as u32;
+        }
+        Ok(())
+    }
+
+    /// The counters after a batch.
+    fn run(&self, gpu: &GpuDevice, batch: &PhotonBatch) -> Result<[u32; 3], GpuError> {
+        let queue = &gpu.queue;
+        queue.write_buffer(&self.batch, 0, bytemuck::bytes_of(batch));
+        queue.write_buffer(&self.counters, 0, &[0; COUNTERS_BYTES as usize]);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            self.kernel.set(&mut pass, &self.groups);
+            pass.dispatch_workgroups(batch.count.div_ceil(WORKGROUP), 1, 1);
+        }
+        encoder.copy_buffer_to_buffer(&self.counters, 0, &self.staging, 0, COUNTERS_BYTES);
+        queue.submit([encoder.finish()]);
+        gpu.check()?;
+        let bytes = gpu.read(&self.staging, COUNTERS_BYTES)?;
+        Ok(bytemuck::pod_read_unaligned(&bytes))
+    }
+
+    fn list(&self, gpu: &GpuDevice, listed: u32) -> Result<Vec<ListedSplat>, GpuError> {
+        let bytes = SPLAT_BYTES * u64::from(listed);
+        if bytes == 0 {
+            return Ok(Vec::new());
+        }
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&self.splats, 0, &self.staging, 0, bytes);
+        gpu.queue.submit([encoder.finish()]);
+        gpu.check()?;
+        Ok(bytemuck::pod_collect_to_vec(
+            &gpu.read(&self.staging, bytes)?,
+        ))
+    }
+}
+
+impl From<ListedSplat> for Splat {
+    fn from(listed: ListedSplat) -> Self {
+        Self {
+            pixel: listed.place >> 1,
+            is_virtual: listed.place & 1 == 1,
+            value: listed.value,
+        }
+    }
+}

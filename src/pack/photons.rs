@@ -1,0 +1,159 @@
+//! What photons are sent to and from which lights.
+
+use glam::Vec3;
+
+use crate::accel::Cover;
+use crate::material::{DELTA_ALPHA, POLISHED_ALPHA, transmits_unblurred};
+use crate::math::luminance;
+use crate::packed::{
+    LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, Light, MATERIAL_LAMBERTIAN,
+    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
+    MAX_PHOTON_SPHERES, Material, NONE, PackedScene, TracedEnvironment, xyz,
+};
+
+/// Light of the environment brighter than so many times its mean is sent as photons: the sun, lamps and windows. The eye's paths find the rest
+/// well.
+const TRACED_ABOVE_MEAN: f64 = 8.0;
+/// Share of the photons that the lights share evenly, whatever the estimates say.
+const EVEN_SHARE: f64 = 0.1;
+
+impl PackedScene {
+    /// Covers the smooth surfaces among the virtual triangles in `range`.
+    pub(super) fn cover_smooth(&self, range: std::ops::Range<usize>) -> Cover {
+        let smooth: Vec<bool> = (self.materials.iter())
+            .map(|material| is_smooth_somewhere(self, material))
+            .collect();
+        let corners: Vec<[Vec3; 3]> = self.triangles[range]
+            .iter()
+            .filter(|triangle| smooth[triangle.material as usize])
+            .map(|triangle| triangle.vertices.map(|v| self.position(v)))
+            .collect();
+        Cover::of(&corners, MAX_PHOTON_SPHERES)
+    }
+
+    /// Fills the frame's spheres about smooth virtual surfaces and the lights' shares of the photons. Wants the lights packed.
+    pub(super) fn pack_photons(&mut self) {
+        self.frame.photon_sphere_count = 0;
+        self.frame.photon_spheres = [[0.0; 4]; MAX_PHOTON_SPHERES];
+        self.frame.env_traced_above = f32::INFINITY;
+        let moving = self.cover_smooth(self.resting.triangles..self.triangles.len());
+        let spheres = Cover::spheres(&[&self.resting_smooth_cover, &moving], MAX_PHOTON_SPHERES);
+        self.frame.photon_spheres[..spheres.len()].copy_from_slice(&spheres);
+        let powers: Vec<f64> = (self.lights.iter())
+            .map(|light| self.power_towards(light, &spheres))
+            .collect();
+        let total: f64 = powers.iter().sum();
+        if total <= 0.0 {
+            return;
+        }
+        self.frame.photon_sphere_count = spheres.len() as u32;
+        let traced = powers.iter().filter(|&&power| power > 0.0).count() as f64;
+        let mut sum = 0.0;
+        for (light, power) in self.lights.iter_mut().zip(&powers) {
+            let pdf = match *power > 0.0 {
+                true => (1.0 - EVEN_SHARE) * power / total + EVEN_SHARE / traced,
+                false => 0.0,
+            };
+            sum += pdf;
+            light.photon_pdf = pdf as f32;
+            light.photon_cdf = sum as f32;
+        }
+        // Rounding must not lead past the last light that has a share.
+        let last = (self.lights.iter()).rposition(|light| light.photon_pdf > 0.0);
+        for light in &mut self.lights[last.unwrap_or(0)..] {
+            light.photon_cdf = 1.0;
+        }
+        if self.frame.env_light != NONE && powers[self.frame.env_light as usize] > 0.0 {
+            self.frame.env_traced_above = self.env_traced.above as f32;
+        }
+    }
+
+    /// Estimate of the power that a light sends to the spheres; 0 where it sends no photons.
+    fn power_towards(&self, light: &Light, spheres: &[[f32; 4]]) -> f64 {
+        use std::f64::consts::{PI, TAU};
+        let brightness = f64::from(luminance(xyz(light.radiance)));
+        let discs: f64 = spheres.iter().map(|s| PI * f64::from(s[3]).powi(2)).sum();
+        let solid_angles = |from: Vec3| -> f64 {
+            let each = spheres.iter().map(|sphere| {
+                let distance2 = (xyz(*sphere) - from).as_dvec3().length_squared();
+                let sin2 = (f64::from(sphere[3]).powi(2) / distance2.max(1e-30)).min(1.0);
+                TAU * (1.0 - (1.0 - sin2).sqrt())
+            });
+            each.sum()
+        };
+        match light.kind {
+            LIGHT_ENVIRONMENT => self.env_traced.mean_radiance * 4.0 * PI * discs,
+            LIGHT_DIRECTIONAL => brightness * discs,
+            LIGHT_POINT | LIGHT_SPOT => brightness * solid_angles(xyz(light.position)),
+            _ => {
+                let (u, v) = (xyz(light.axis_u), xyz(light.axis_v));
+                let half = if light.triangle == NONE {
+                    0.5
+                } else {
+                    1.0 / 3.0
+                };
+                let centre = xyz(light.position) + (u + v) * half;
+                0.5 * brightness * f64::from(light.radiance[3]) * solid_angles(centre)
+            }
+        }
+    }
+}
+
+/// Whether the surface has somewhere a lobe that mirrors or bends light without blurring it, or is polished.
+fn is_smooth_somewhere(packed: &PackedScene, material: &Material) -> bool {
+    if material.flags & (MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT | MATERIAL_LAMBERTIAN) != 0 {
+        return false;
+    }
+    let roughness = material.roughness * least_green(packed, material.metallic_roughness_texture);
+    let coat =
+        material.clearcoat_roughness * least_green(packed, material.clearcoat_roughness_texture);
+    let alpha = roughness * roughness;
+    let is_textured = material.flags & MATERIAL_TEXTURED != 0;
+    let pure = material.metallic == 1.0
+        || material.transmission == 1.0
+        || material.base_color[..3] == [0.0; 3]
+        || (is_textured && material.metallic.max(material.transmission) > 0.0);
+    let is_polished = pure && alpha < POLISHED_ALPHA;
+    let mirrors = alpha < DELTA_ALPHA
+        && (material.metallic > 0.0 || material.specular > 0.0 || material.transmission > 0.0);
+    let bends = material.transmission > 0.0
+        && material.flags & MATERIAL_THIN_WALLED == 0
+        && material.ior != 1.0
+        && transmits_unblurred(alpha, material.ior);
+    is_polished || mirrors || bends || (material.clearcoat > 0.0 && coat * coat < DELTA_ALPHA)
+}
+
+/// Least value of a texture's second channel, in 0..1; 1 where there is none.
+fn least_green(packed: &PackedScene, texture: u32) -> f32 {
+    let Some(texture) = packed.texture_refs.get(texture as usize) else {
+        return 1.0;
+    };
+    let first = texture.offset as usize;
+    let texels = &packed.texels[first..first + (texture.width * texture.height) as usize];
+    let least = texels.iter().map(|texel| texel.to_le_bytes()[1]).min();
+    f32::from(least.unwrap_or(255)) / 255.0
+}
+
+/// What photons bring of a map of three floats a texel, scaled; `mean`: its luminance over the sphere.
+pub(super) fn traced_environment(
+    width: u32,
+    height: u32,
+    texels: &[f32],
+    scale: f64,
+    mean: f64,
+) -> TracedEnvironment {
+    let above = TRACED_ABOVE_MEAN * mean;
+    let (mut sum, mut area) = (0.0, 0.0);
+    for (row, texels) in texels.chunks(3 * width as usize).enumerate() {
+        let middle = (row as f64 + 0.5) / f64::from(height) * std::f64::consts::PI;
+        for texel in texels.chunks(3) {
+            let brightness = f64::from(luminance(Vec3::from_slice(texel))) * scale;
+            sum += (brightness - above).max(0.0) * middle.sin();
+            area += middle.sin();
+        }
+    }
+    TracedEnvironment {
+        above,
+        mean_radiance: sum / area.max(1e-30),
+    }
+}
