@@ -67,13 +67,9 @@ impl Blocks {
         corners.map(|(x, y)| square(x, y)).collect()
     }
 
-    /// One pixel of a block, chosen by 32 random bits.
-    pub fn pixel(&self, block: usize, random: u32) -> usize {
-        let (x0, y0) = self.corner(block);
-        let columns = SIDE_PX.min(self.width - x0);
-        let rows = SIDE_PX.min(self.height - y0);
-        let x = x0 + (random & 0xffff) as usize % columns;
-        let y = y0 + (random >> 16) as usize % rows;
+    /// The first pixel of a block.
+    pub fn first_pixel(&self, block: usize) -> usize {
+        let (x, y) = self.corner(block);
         y * self.width + x
     }
 

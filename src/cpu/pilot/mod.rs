@@ -79,7 +79,7 @@ pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
     let importances: Vec<f32> = (0..blocks.count())
         .into_par_iter()
         .map(|block| {
-            let pixel = blocks.pixel(block, 0) as u32;
+            let pixel = blocks.first_pixel(block) as u32;
             importance(
                 scene,
                 &Beam::of_pixel(&scene.frame, &pinhole, pixel),
