@@ -6,11 +6,13 @@ import package::packed::records::{
     MATERIAL_UNLIT, SIDE_REAL, SIDE_VIRTUAL,
 };
 import package::shared::NONE;
+import package::material::scatter::BsdfSample;
 import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample};
 import package::camera::sampler::{SampleSet, fourth, pair, second_pair, third};
 import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres};
 import package::cpu::contribution::{accumulate, density_weight, draw, events_after, left_to_photons, vertex_left_to_photons};
 import package::light::environment::share_left_to_eye;
+import package::light::guide::{GUIDE_SHARE, guide_cell, guide_count, guide_pdf, guide_sample};
 import package::cpu::points::{keep_first_vertex, offer_point};
 import package::cpu::contribution::{
     SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
@@ -18,7 +20,7 @@ import package::cpu::contribution::{
 import package::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 import package::math::{dot3, exp_, safe_sqrt};
 import package::cpu::state::{
-    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, DifferenceRay, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
+    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_GUIDED, EVENT_SCATTERED, MODE_MIXED, DifferenceRay, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
     PENDING_SHADOW, PathState, REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED,
     REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL, RayOrigin, Segment, path_differences, path_nexts,
 };
@@ -191,6 +193,7 @@ fn light_contribution(
     var weight = 1.0;
     if !l.delta && !lights_suffice(st, s) {
         var other = f.pdf;
+        @if(guide) { other = path_pdf(st, s, l.direction, f.pdf); }
         @if(!paper) {
             if difference {
                 other = 0.0;
@@ -253,6 +256,46 @@ fn medium_along(st: ptr<function, PathState>, s: Surface, direction: vec3<f32>) 
     return (*st).path.medium;
 }
 
+fn guided_share(st: ptr<function, PathState>, s: Surface) -> f32 {
+    if frame.guide_cell_count == 0u
+        || (*st).path.mode != MODE_MIXED
+        || (*st).ray.depth == 1u
+        || ((*st).path.events & EVENT_SCATTERED) != 0u
+        || bsdf_is_polished(s)
+        || guide_count(guide_cell(s.position)) == 0u {
+        return 0.0;
+    }
+    return GUIDE_SHARE;
+}
+
+fn path_pdf(st: ptr<function, PathState>, s: Surface, direction: vec3<f32>, bsdf_pdf: f32) -> f32 {
+    let share = guided_share(st, s);
+    if share == 0.0 { return bsdf_pdf; }
+    return (1.0 - share) * bsdf_pdf + share * guide_pdf(guide_cell(s.position), s.position, direction);
+}
+
+fn path_sample(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, u: vec3<f32>, share: f32) -> BsdfSample {
+    var b = bsdf_sample(s, wo, u);
+    @if(!guide) { return b; }
+    if share == 0.0 { return b; }
+    let by_guide = draw(st, SET_DIFFERENCE_CONE);
+    if third(by_guide) < share {
+        b.wi = guide_sample(guide_cell(s.position), s.position, fourth(by_guide), pair(by_guide));
+        b.delta = false;
+    } else if !b.valid {
+        return b;
+    }
+    if b.delta {
+        b.weight *= 1.0 / (1.0 - share);
+        return b;
+    }
+    let f = bsdf_eval(s, wo, b.wi);
+    b.pdf = path_pdf(st, s, b.wi, f.pdf);
+    b.valid = b.pdf > 0.0 && max_element(f.f_cos) > 0.0;
+    b.weight = f.f_cos * (1.0 / max(b.pdf, MIN_POSITIVE));
+    return b;
+}
+
 fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques) {
     let difference = is_difference(st);
     let leaves_to_cones = left_to_cones(s);
@@ -261,7 +304,10 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
     if !plays(u, techniques.bsdf_probability) { return; }
     var lobe = 0.0;
     if !bsdf_is_lambertian(s) { lobe = third(u); }
-    let b = bsdf_sample(s, wo, vec3<f32>(lobe, pair(u)));
+    let v = vec3<f32>(lobe, pair(u));
+    var share = 0.0;
+    @if(guide) { share = guided_share(st, s); }
+    let b = path_sample(st, s, wo, v, share);
     if !b.valid { return; }
     var events = (*st).path.events;
     @if(photons) {
@@ -269,6 +315,7 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
             let smooth_ = b.delta || bsdf_is_polished(s);
             events = events_after(events, (*st).ray.depth, (*st).ray.side, smooth_);
         }
+        if share > 0.0 { events |= EVENT_GUIDED; }
     }
     var segment = Segment(
         b.wi,
@@ -294,7 +341,7 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
         }
     }
     @if(multi_bounce) {
-        if (*st).ray.depth >= ROULETTE_FROM_DEPTH {
+        if (*st).ray.depth >= ROULETTE_FROM_DEPTH && (events & EVENT_GUIDED) == 0u {
             let survival = min(ROULETTE_GAIN * max_element(abs(segment.throughput)), 1.0);
             if !plays(u, survival) { return; }
             segment.throughput *= 1.0 / survival;

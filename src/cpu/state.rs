@@ -85,6 +85,8 @@ shared! {
     pub const EVENT_REAL_CHAIN: u32 = 8;
     /// The present vertex of a difference is polished.
     pub const EVENT_AT_POLISHED: u32 = 16;
+    /// The guide may have drawn the path's last direction that was not a smooth surface's.
+    pub const EVENT_GUIDED: u32 = 32;
 
     /// Density that stands for a delta distribution: no other technique can find its directions.
     pub const DELTA_DENSITY: f32 = -1.0;

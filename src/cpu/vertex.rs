@@ -11,10 +11,11 @@ use crate::light::cones::{
     Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres,
 };
 use crate::light::environment::share_left_to_eye;
+use crate::light::guide::{GUIDE_SHARE, guide_cell, guide_count, guide_pdf, guide_sample};
 use crate::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 use crate::material::{
-    Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_is_polished,
-    bsdf_passes_straight, bsdf_sample,
+    BsdfSample, Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian,
+    bsdf_is_polished, bsdf_passes_straight, bsdf_sample,
 };
 use crate::math::{dot3, exp_, safe_sqrt};
 use crate::packed::{
@@ -38,6 +39,9 @@ shared! {
     /// A light's own surface must not block it: shadow rays end this much short of it, relative to the distance and in position errors.
     pub const SHADOW_SHORTEN: f32 = 2e-5;
     pub const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
+
+    /// A density below it is none.
+    const MIN_POSITIVE: f32 = f32::MIN_POSITIVE;
 
     /// Surfaces that scatter nothing.
     pub const EMITS_ONLY: u32 = MATERIAL_UNLIT | MATERIAL_QUAD_LIGHT;
@@ -278,7 +282,7 @@ fn light_contribution(
     }
     let mut weight = 1.0;
     if !l.delta && !lights_suffice(scene, st, s) {
-        let mut other = f.pdf;
+        let mut other = path_pdf(scene, st, s, l.direction, f.pdf);
         if let Some(t) = techniques {
             other = t.cone_probability * cone_pdf(&t.cones, l.direction);
             if !left_to_cones(scene, s) {
@@ -357,6 +361,68 @@ pub fn medium_along(st: &PathState, s: &Surface, direction: Vec3) -> u32 {
     if s.front { s.material } else { NONE }
 }
 
+/// Share of the directions of a path that the guide draws: at the first vertex that scatters, where the camera sees it by way of smooth surfaces.
+fn guided_share(scene: &PackedScene, st: &PathState, s: &Surface) -> f32 {
+    if scene.frame.guide_cell_count == 0
+        || st.path.mode != MODE_MIXED
+        || st.ray.depth == 1
+        || st.path.events & EVENT_SCATTERED != 0
+        || bsdf_is_polished(s)
+        || guide_count(scene, guide_cell(scene, s.position)) == 0
+    {
+        return 0.0;
+    }
+    GUIDE_SHARE
+}
+
+/// Density with which a path's direction is drawn, `bsdf_pdf` being the BSDF's.
+fn path_pdf(
+    scene: &PackedScene,
+    st: &PathState,
+    s: &Surface,
+    direction: Vec3,
+    bsdf_pdf: f32,
+) -> f32 {
+    let share = guided_share(scene, st, s);
+    if share == 0.0 {
+        return bsdf_pdf;
+    }
+    let cell = guide_cell(scene, s.position);
+    (1.0 - share) * bsdf_pdf + share * guide_pdf(scene, cell, s.position, direction)
+}
+
+/// A path's next direction, by the BSDF or, with the probability `share`, by the guide.
+fn path_sample(
+    scene: &PackedScene,
+    st: &PathState,
+    s: &Surface,
+    wo: Vec3,
+    u: [f32; 3],
+    share: f32,
+) -> BsdfSample {
+    let mut b = bsdf_sample(s, wo, u);
+    if share == 0.0 {
+        return b;
+    }
+    let guide = draw(scene, st, SET_DIFFERENCE_CONE);
+    if guide.third() < share {
+        let cell = guide_cell(scene, s.position);
+        b.wi = guide_sample(scene, cell, s.position, guide.fourth(), guide.pair());
+        b.delta = false;
+    } else if !b.valid {
+        return b;
+    }
+    if b.delta {
+        b.weight *= 1.0 / (1.0 - share);
+        return b;
+    }
+    let f = bsdf_eval(s, wo, b.wi);
+    b.pdf = path_pdf(scene, st, s, b.wi, f.pdf);
+    b.valid = b.pdf > 0.0 && f.f_cos.max_element() > 0.0;
+    b.weight = f.f_cos * (1.0 / b.pdf.max(MIN_POSITIVE));
+    b
+}
+
 /// The BSDF's own direction: the path's next ray, or (c) the recursion of the difference.
 fn plan_continuation(
     scene: &PackedScene,
@@ -385,17 +451,20 @@ fn plan_continuation(
         u.third()
     };
     let [x, y] = u.pair();
-    let b = bsdf_sample(s, wo, [lobe, x, y]);
+    let share = guided_share(scene, st, s);
+    let b = path_sample(scene, st, s, wo, [lobe, x, y], share);
     if !b.valid {
         return;
     }
     let straight = b.delta && b.transmitted && bsdf_passes_straight(s);
-    let events = if straight {
-        st.path.events
-    } else {
+    let mut events = st.path.events;
+    if !straight {
         let smooth = b.delta || bsdf_is_polished(s);
-        events_after(st.path.events, st.ray.depth, st.ray.side, smooth)
-    };
+        events = events_after(events, st.ray.depth, st.ray.side, smooth);
+    }
+    if share > 0.0 {
+        events |= EVENT_GUIDED;
+    }
     let mut segment = Segment {
         direction: b.wi,
         density: if b.delta { DELTA_DENSITY } else { b.pdf },
@@ -421,7 +490,8 @@ fn plan_continuation(
         };
         return;
     }
-    if st.ray.depth >= ROULETTE_FROM_DEPTH {
+    // A guided direction's throughput is small because much light is expected from there.
+    if st.ray.depth >= ROULETTE_FROM_DEPTH && events & EVENT_GUIDED == 0 {
         let survival = (ROULETTE_GAIN * segment.throughput.abs().max_element()).min(1.0);
         if !plays(&u, survival) {
             return;

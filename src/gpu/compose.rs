@@ -74,6 +74,8 @@ features! {
     sharing,
     /// Photons are traced.
     photons,
+    /// What photons found guides paths that are seen by way of smooth surfaces.
+    guide,
 }
 
 impl Features {
@@ -120,6 +122,7 @@ impl Features {
             shutter: scene.frame.flags & packed::FRAME_SHUTTER != 0,
             sharing: (scene.pixels.iter()).any(|info| info.flags & packed::PIXEL_SHARES != 0),
             photons: cpu::contribution::photons_traced(&scene.frame),
+            guide: scene.frame.guide_cell_count > 0,
         }
     }
 }
@@ -157,6 +160,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &camera::splat::SHARED,
     &light::cones::SHARED,
     &light::environment::SHARED,
+    &light::guide::SHARED,
     &light::lights::SHARED,
     &light::rectangle::SHARED,
     &material::fresnel::SHARED,

@@ -4,6 +4,7 @@ pub mod blocking;
 pub mod cones;
 pub mod environment;
 pub mod environment_table;
+pub mod guide;
 pub mod lights;
 pub(crate) mod rectangle;
 #[cfg(test)]

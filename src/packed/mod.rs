@@ -36,6 +36,8 @@ pub struct PackedScene {
     /// For `albedo = "from-photo"`, empty where unused: albedo of the photograph's pixels and the depth (metres along the axis) it was seen
     /// at, then for each scene object the median that its points take which the camera does not see.
     pub photo_albedo: Vec<[f32; 4]>,
+    /// Lobes of the cells of `light::guide`: the point that each is about and 1 - cos of its half-angle, 0 where a cell has no more.
+    pub guide: Vec<[f32; 4]>,
     /// One word a pixel: what the pilot found (see [`PixelInfo`]).
     pub pixels: Vec<PixelInfo>,
     /// What bounds moving objects over the whole time of the shutter; empty where nothing moves: then the frame's spheres do.
@@ -87,6 +89,7 @@ impl PackedScene {
             env_texels: Vec::new(),
             env_cdf: Vec::new(),
             photo_albedo: Vec::new(),
+            guide: Vec::new(),
             pixels: Vec::new(),
             swept_spheres: Vec::new(),
             material_table: materials::MaterialTable::default(),

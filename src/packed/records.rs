@@ -86,8 +86,10 @@ shared! {
         pub photon_spheres: [[f32; 4]; MAX_PHOTON_SPHERES],
         /// 0: no photons are traced.
         pub photon_sphere_count: u32,
-        pub pad: u32,
-        pub pad_end: [u32; 2],
+        /// Cells of the guide, a power of two; 0: there is none.
+        pub guide_cell_count: u32,
+        pub guide_cells_per_m: f32,
+        pub pad_end: u32,
     }
 
     pub const APERTURE_DISC: u32 = 0;
@@ -123,6 +125,8 @@ shared! {
     pub const FRAME_NO_SHARING: u32 = 1024;
     /// Without the saving `photons`: the eye's paths look for caustics.
     pub const FRAME_NO_PHOTONS: u32 = 512;
+    /// Without the saving `guide`. No shader reads it.
+    pub const FRAME_NO_GUIDE: u32 = 8192;
 
     #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
     pub struct Vertex {

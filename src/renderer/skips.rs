@@ -2,8 +2,8 @@
 
 use super::ErrorGoal;
 use crate::packed::{
-    FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, FRAME_NO_PHOTONS, FRAME_NO_SHARING,
-    Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PixelInfo,
+    FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_GUIDE, FRAME_NO_LAST_VERTEX, FRAME_NO_PHOTONS,
+    FRAME_NO_SHARING, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PixelInfo,
 };
 use crate::scene::{Choice, Estimator};
 
@@ -31,6 +31,8 @@ pub enum Skip {
     /// Caustics of smooth virtual objects come as photons from the lights; without them the eye's paths look for them, and those of lights without
     /// size stay dark. The expectation is the same but for those.
     Photons,
+    /// Seen in a mirror or through glass, paths look for caustics where photons found them to come from. The expectation is the same.
+    Guide,
     /// Shaders hold the code that the scene needs and no more (GPU). The result is the same to rounding.
     Specialisation,
     /// With a goal, each tile takes the samples that it needs; without, every tile those of the neediest. Both reach the goal.
@@ -51,6 +53,7 @@ impl Choice for Skip {
         ("sharing", Self::Sharing),
         ("last-vertex", Self::LastVertex),
         ("photons", Self::Photons),
+        ("guide", Self::Guide),
         ("specialisation", Self::Specialisation),
         ("adaptive", Self::Adaptive),
         ("camera-noise", Self::CameraNoise),
@@ -98,7 +101,8 @@ impl Without {
             | Skip::Cones
             | Skip::Sharing
             | Skip::LastVertex
-            | Skip::Photons => true,
+            | Skip::Photons
+            | Skip::Guide => true,
         })
     }
 
@@ -130,6 +134,7 @@ impl Without {
             | Skip::Sharing
             | Skip::LastVertex
             | Skip::Photons
+            | Skip::Guide
                 if estimator == Estimator::Paper =>
             {
                 Some("the estimator is paper")
@@ -155,6 +160,7 @@ impl Without {
             (Skip::LastVertex, FRAME_NO_LAST_VERTEX),
             (Skip::Sharing, FRAME_NO_SHARING),
             (Skip::Photons, FRAME_NO_PHOTONS),
+            (Skip::Guide, FRAME_NO_GUIDE),
         ] {
             if self.contains(skip) {
                 frame.flags |= flag;

@@ -355,6 +355,18 @@ fn photons_save_error(backend: BackendChoice) {
     }
 }
 
+/// What a mirror and a glass show of the table is lit by themselves.
+fn the_guide_saves_error(backend: BackendChoice) {
+    for (objects, max_bounces) in [(MIRROR_BALL, 3), (GLASS_BALL, 6)] {
+        let scene = smooth_under(CEILING, objects, max_bounces);
+        let pair = pair(&scene, backend, Skip::Guide, None, 128);
+        same_expectation(&pair, Skip::Guide);
+    }
+    let scene = smooth_under(LAMP, MIRROR_BALL, 3);
+    let [with, without] = pair(&scene, backend, Skip::Guide, None, 64);
+    assert!(with.cost() < without.cost());
+}
+
 /// At the first vertex of a path, at the second of a difference, and behind the ball.
 fn the_last_vertex_saves_rays(backend: BackendChoice) {
     for max_bounces in [1, 2] {

@@ -12,7 +12,7 @@ use crate::gpu::{Features, GpuBackend, GpuDevice, GpuError, SceneBuffers, SceneP
 use crate::packed::Frame;
 use crate::renderer::{Budget, RayCounts, RenderError, Renderer, RendererOptions, Skip, Watcher};
 use crate::scene::{BackendChoice, Scene};
-use crate::work::WorkList;
+use crate::work::{PhotonWork, WorkList};
 
 /// A case that could not be measured at all.
 #[derive(Debug, thiserror::Error)]
@@ -155,10 +155,20 @@ impl Gpu {
             }
         };
         let mut film = Film::new(packed.frame.width, packed.frame.height, first, false);
+        film.set_photons(packed.photons_per_ray > 0);
         let backend = &mut self.compiled[at].1;
         let (mut rays, infos) = (RayCounts::default(), &packed.pixels);
         let main = WorkList::main(infos, &film, |_| end);
         backend.render(&mut film, &main, &mut rays, &Watcher::none())?;
+        if packed.photons_per_ray > 0 {
+            let numbered = |ray: u32| u64::from(ray) * packed.photons_per_ray;
+            let work = PhotonWork {
+                first: numbered(first),
+                end: numbered(end),
+                window: [0.0, 1.0],
+            };
+            backend.trace_photons(&mut film, &work, &mut rays, &Watcher::none())?;
+        }
         let real = WorkList::real(infos, &film, false, |_| end);
         backend.render(&mut film, &real, &mut rays, &Watcher::none())?;
         Ok(film)

@@ -1,6 +1,6 @@
 //! The table of cases.
 
-use super::{Case, light, pictures, traversal};
+use super::{Case, light, pictures, shortcuts, traversal};
 
 const BRUTE_FORCE: &str = "f64 brute force, ray by ray";
 const ORACLE: &str = "f64 brute-force renderer, same samples";
@@ -33,6 +33,24 @@ const fn rays(name: &'static str, what: &'static str) -> Case {
         oracle: BRUTE_FORCE,
         quantity: WRONG_HITS,
         bound: 0.0,
+        ..picture(name, what)
+    }
+}
+
+const fn photons(name: &'static str, what: &'static str) -> Case {
+    Case {
+        oracle: "albedo E cos / pi",
+        quantity: "relative error of the mean",
+        bound: 0.05,
+        ..picture(name, what)
+    }
+}
+
+const fn shared(name: &'static str, what: &'static str) -> Case {
+    Case {
+        oracle: "albedo L (r/d)^2 cos",
+        quantity: "relative error of what the ball takes",
+        bound: 0.02,
         ..picture(name, what)
     }
 }
@@ -136,6 +154,47 @@ pub fn cases() -> Vec<Case> {
             bound: 5e-3,
             run: light::form_factor,
             ..picture("black ball", "a black ball over a plane, scaled and moved")
+        },
+        Case {
+            unit: "m",
+            settings: &[1e-4, 1e-2, 1.0],
+            quick_settings: &[1e-4],
+            control_at: 1.0,
+            run: shortcuts::at_the_lens,
+            ..photons("photons at the lens", "a wall so far from the lens plane, lit by a mirror")
+        },
+        Case {
+            unit: "m",
+            settings: &[1e3, 1e5],
+            quick_settings: &[1e5],
+            control_at: 1e5,
+            run: shortcuts::moved_photons,
+            ..photons("photons moved", "the same, the world and the camera moved")
+        },
+        Case {
+            unit: "photons",
+            settings: &[1.0, 10.0],
+            quick_settings: &[1.0],
+            control_at: 10.0,
+            bound: 0.5,
+            run: shortcuts::few_pilot_photons,
+            ..photons("few pilot photons", "the same, the pilot seeing about as many photons")
+        },
+        Case {
+            unit: "x",
+            settings: &[10.0, 1e2, 1e4],
+            quick_settings: &[1e4],
+            control_at: 10.0,
+            run: shortcuts::apart,
+            ..shared("sharing across depths", "pixels of a tile so many times nearer than others")
+        },
+        Case {
+            unit: "rad",
+            settings: &[0.1, 1e-2, 1e-3],
+            quick_settings: &[1e-3],
+            control_at: 1e-2,
+            run: shortcuts::grazing_links,
+            ..shared("grazing links", "a ball over the floor, seen from it at this angle")
         },
         Case {
             settings: &[0.0, 1e-4],

@@ -13,6 +13,7 @@ mod oracle;
 mod pictures;
 mod report;
 pub(crate) mod scenes;
+mod shortcuts;
 mod traversal;
 
 use std::time::Instant;

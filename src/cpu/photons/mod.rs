@@ -2,6 +2,7 @@
 //! (docs/estimator.md). They bring exactly the paths that the eye's samples leave to them ([`super::contribution::left_to_photons`]).
 
 pub mod emission;
+pub mod guide;
 pub mod path;
 pub mod plan;
 pub mod render;

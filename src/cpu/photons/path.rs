@@ -92,6 +92,32 @@ pub fn trace_photon(
     photon.st
 }
 
+/// Where a photon lands first on what scatters, and the point that it came from.
+#[derive(Clone, Copy, Debug)]
+pub struct Landing {
+    pub position: Vec3,
+    pub from: Vec3,
+}
+
+/// Follows a photon to its first landing, if it gets there.
+pub fn first_landing(scene: &PackedScene, number: PhotonNumber) -> Option<Landing> {
+    let mut photon = begin(scene, number);
+    let mut from = photon.st.ray.origin.position;
+    while photon.flux != Vec3::ZERO
+        && let Some((s, wi)) = next_vertex(scene, &mut photon)
+    {
+        if photon.chained && !bsdf_is_polished(&s) {
+            let position = s.position;
+            return Some(Landing { position, from });
+        }
+        from = s.position;
+        if photon.st.ray.depth >= scene.frame.max_bounces || !scatter(scene, &mut photon, &s, wi) {
+            return None;
+        }
+    }
+    None
+}
+
 fn draw(photon: &Photon, set: u32) -> SampleSet {
     sample_set(photon.key, set)
 }

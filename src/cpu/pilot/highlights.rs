@@ -20,8 +20,8 @@ use crate::packed::{NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene};
 const PATHS: u32 = 8;
 
 /// Squared error that one sample has of the light that it meets by way of smooth virtual surfaces: mean of the channels and of those pixels
-/// of each block that show such a surface.
-pub fn highlights(scene: &PackedScene, blocks: &Blocks) -> Vec<f32> {
+/// of each block that show such a surface; none where none does.
+pub fn highlights(scene: &PackedScene, blocks: &Blocks) -> Vec<Option<f32>> {
     (0..blocks.count())
         .into_par_iter()
         .map(|block| {
@@ -30,7 +30,7 @@ pub fn highlights(scene: &PackedScene, blocks: &Blocks) -> Vec<f32> {
                 sum += error;
                 count += 1;
             }
-            sum / count.max(1) as f32
+            (count > 0).then(|| sum / count as f32)
         })
         .collect()
 }

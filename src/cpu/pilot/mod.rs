@@ -14,6 +14,7 @@ mod measurement;
 use rayon::prelude::*;
 
 use super::contribution::photons_traced;
+use super::photons::guide::learn;
 use super::photons::plan::{EyeMoments, photons_per_ray, unmeasured};
 use allocation::{Rates, allocate};
 use beam::Beam;
@@ -24,9 +25,9 @@ use importance::{PilotLights, importance};
 
 use crate::cpu::sharing::BLOCK_SIDE;
 use crate::packed::{
-    ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_SHARING, Frame,
-    PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PIXEL_SHARES, PIXEL_SHARES_NEAR, PackedScene,
-    PixelInfo, SIDE_VIRTUAL,
+    ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_GUIDE, FRAME_NO_SHARING,
+    Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PIXEL_SHARES, PIXEL_SHARES_NEAR,
+    PackedScene, PixelInfo, SIDE_VIRTUAL,
 };
 use crate::work::Meter;
 
@@ -51,6 +52,8 @@ pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
         && scene.swept_spheres.is_empty()
         && !scene.lights.iter().any(|l| l.side == SIDE_VIRTUAL);
     scene.photons_per_ray = 0;
+    scene.frame.guide_cell_count = 0;
+    scene.guide.clear();
     if nothing_virtual {
         scene.pixels = vec![PixelInfo::uniform(PIXEL_OUT_OF_REACH); width * height];
         return;
@@ -178,9 +181,23 @@ fn measure(
     let highlights = if scene.frame.photon_sphere_count > 0 {
         highlights::highlights(scene, blocks)
     } else {
-        vec![0.0; blocks.count()]
+        vec![None; blocks.count()]
     };
-    scene.frame = frame;
+    let (mut guide_cell_count, mut guide_cells_per_m) = (0, 0.0);
+    if photons_traced(&scene.frame)
+        && scene.frame.flags & FRAME_NO_GUIDE == 0
+        && highlights.iter().any(Option::is_some)
+    {
+        learn(scene);
+        (guide_cell_count, guide_cells_per_m) =
+            (scene.frame.guide_cell_count, scene.frame.guide_cells_per_m);
+    }
+    scene.frame = Frame {
+        guide_cell_count,
+        guide_cells_per_m,
+        ..frame
+    };
+    let highlights = highlights.iter().map(|h| h.unwrap_or(0.0)).collect();
     (measured, highlights)
 }
 

@@ -269,6 +269,15 @@ const TRACES: &[Trace] = &[
         ..ADVANCE
     },
     Trace {
+        feature: "guide",
+        with: &[
+            "fn light_guide__",
+            "fn cpu_vertex__path_sample",
+            "gpu_buffers__guide",
+        ],
+        ..ADVANCE
+    },
+    Trace {
         feature: "sharing",
         kernel: "kernel_share",
         with: &["fn cpu_sharing__link_points", "fn cpu_request__answer"],
