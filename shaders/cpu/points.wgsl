@@ -5,12 +5,12 @@ import package::packed::records::PIXEL_SHARES;
 import package::material::bsdf::bsdf_is_lambertian;
 import package::material::surface::Surface;
 import package::cpu::state::{
-    FIRST_DIFFERENCE, FIRST_NONE, FIRST_VIRTUAL, FirstVertex, MODE_DIFFERENCE, MODE_MIXED, POINT_COVERED, POINT_COVERING, POINT_NONE, POINT_RECURSION, PathState,
+    EVENT_PASSED, FIRST_DIFFERENCE, FIRST_NONE, FIRST_VIRTUAL, FirstVertex, MODE_DIFFERENCE, MODE_MIXED, POINT_COVERED, POINT_COVERING, POINT_NONE, POINT_RECURSION, PathState,
     SharedPoint, path_firsts, path_points, path_results,
 };
 
 fn shares(st: ptr<function, PathState>) -> bool {
-    return (pixels[(*st).path.pixel].flags & PIXEL_SHARES) != 0u;
+    return (pixels[(*st).path.pixel].flags & PIXEL_SHARES) != 0u && ((*st).path.events & EVENT_PASSED) == 0u;
 }
 
 fn keep_first_vertex(st: ptr<function, PathState>, s: Surface, cone_probability: f32, bsdf_probability: f32) {

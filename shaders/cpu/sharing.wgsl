@@ -9,6 +9,7 @@ import package::film::sums::is_unusable;
 import package::light::cones::{cone_pdf, cones_at};
 import package::material::scatter::lambert_cos;
 import package::math::{INV_PI, dot3, length3, safe_sqrt};
+import package::cpu::panes::blocks;
 import package::cpu::request::answer;
 import package::cpu::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS};
 import package::cpu::state::{
@@ -64,9 +65,13 @@ fn sees(st: ptr<function, PathState>, first: FirstVertex, point: SharedPoint, ki
         0u,
     );
     answer(st, thread);
-    let open_virtual = (*st).hits.in_virtual.triangle == NONE;
-    let open_real = (*st).hits.in_real.triangle == NONE;
-    return open_real && open_virtual != covered;
+    let in_real = (*st).hits.in_real;
+    let in_virtual = (*st).hits.in_virtual;
+    if covered {
+        let by_no_pane = blocks(in_virtual) && in_virtual.t == 0.0;
+        return in_real.triangle == NONE && by_no_pane;
+    }
+    return in_real.triangle == NONE && in_virtual.triangle == NONE;
 }
 
 fn first_link(kind: u32) -> u32 {

@@ -2,7 +2,7 @@
 
 import package::packed::records::{MATERIAL_LAMBERTIAN, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT};
 import package::material::interface::{max3, surface_index, thin_walled};
-import package::material::lobes::{lobes_albedo, lobes_are_delta, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample};
+import package::material::lobes::{lobes_albedo, lobes_are_delta, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample, lobes_straight};
 import package::material::scatter::{BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, lambert_cos, sample_lambert};
 import package::math::INV_PI;
 import package::material::surface::Surface;
@@ -57,6 +57,13 @@ fn bsdf_is_polished(s: Surface) -> bool {
 
 fn bsdf_passes_straight(s: Surface) -> bool {
     return thin_walled(s) || surface_index(s).eta2_minus_1 == 0.0;
+}
+
+fn bsdf_straight(s: Surface, wo: vec3<f32>) -> vec3<f32> {
+    if scatters_nothing(s) || bsdf_is_lambertian(s) || !bsdf_passes_straight(s) {
+        return vec3<f32>(0.0);
+    }
+    return lobes_straight(s, wo);
 }
 
 fn bsdf_index_ratio(s: Surface) -> f32 {

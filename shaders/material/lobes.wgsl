@@ -230,6 +230,13 @@ fn lobes_are_delta(s: Surface) -> bool {
     return max3(diffuse_color(s)) == 0.0 && reflects_delta(s) && (s.clearcoat == 0.0 || coat_delta(s));
 }
 
+fn lobes_straight(s: Surface, wo: vec3<f32>) -> vec3<f32> {
+    if !transmits_delta(s) {
+        return vec3<f32>(0.0);
+    }
+    return interface_at(s, cos_to(s.ns, wo)).transmitted * (1.0 - coat_share(s, wo));
+}
+
 fn lobes_albedo(s: Surface, wo: vec3<f32>) -> vec3<f32> {
     let lobes = lobes_at(s, wo);
     let under = lobes.interface_.reflected + lobes.interface_.transmitted

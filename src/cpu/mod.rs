@@ -4,6 +4,7 @@ mod batch;
 pub mod contribution;
 pub mod estimator;
 mod in_flight;
+pub mod panes;
 pub mod photons;
 pub mod pilot;
 pub mod points;

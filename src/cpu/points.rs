@@ -10,7 +10,9 @@ use crate::material::{Surface, bsdf_is_lambertian};
 use crate::packed::{PIXEL_SHARES, PackedScene};
 
 fn shares(scene: &PackedScene, st: &PathState) -> bool {
+    // Links between vertices do not look through panes, and what lies behind is not shared.
     scene.pixels[st.path.pixel as usize].flags & PIXEL_SHARES != 0
+        && st.path.events & EVENT_PASSED == 0
 }
 
 /// Keeps the vertex, if it is the first and may use others' points; with the chances that cones and BSDF are played.

@@ -74,6 +74,8 @@ features! {
     sharing,
     /// Photons are traced.
     photons,
+    /// Light goes straight through some material.
+    panes,
 }
 
 impl Features {
@@ -120,6 +122,7 @@ impl Features {
             shutter: scene.frame.flags & packed::FRAME_SHUTTER != 0,
             sharing: (scene.pixels.iter()).any(|info| info.flags & packed::PIXEL_SHARES != 0),
             photons: cpu::contribution::photons_traced(&scene.frame),
+            panes: scene.frame.flags & packed::FRAME_PANES != 0,
         }
     }
 }
@@ -155,6 +158,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &camera::sampler::SHARED,
     &camera::shutter::SHARED,
     &camera::splat::SHARED,
+    &cpu::panes::SHARED,
     &light::cones::SHARED,
     &light::environment::SHARED,
     &light::lights::SHARED,

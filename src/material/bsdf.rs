@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::interface::{max3, surface_index, thin_walled};
 use super::lobes::{
     lobes_albedo, lobes_are_delta, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample,
+    lobes_straight,
 };
 use super::scatter::{
     BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, lambert_cos, sample_lambert,
@@ -74,6 +75,14 @@ pub fn bsdf_is_polished(s: &Surface) -> bool {
 /// What a smooth interface lets through goes straight on: it bends nothing.
 pub fn bsdf_passes_straight(s: &Surface) -> bool {
     thin_walled(s) || surface_index(s).eta2_minus_1 == 0.0
+}
+
+/// Share of the light from straight behind that comes through unbent and unblurred.
+pub fn bsdf_straight(s: &Surface, wo: Vec3) -> Vec3 {
+    if scatters_nothing(s) || bsdf_is_lambertian(s) || !bsdf_passes_straight(s) {
+        return Vec3::ZERO;
+    }
+    lobes_straight(s, wo)
 }
 
 /// Index of the volume beyond the surface over that on the side of the ray.

@@ -284,6 +284,14 @@ pub fn lobes_are_delta(s: &Surface) -> bool {
     max3(diffuse_color(s)) == 0.0 && reflects_delta(s) && (s.clearcoat == 0.0 || coat_delta(s))
 }
 
+/// What an interface that bends and blurs nothing lets through.
+pub fn lobes_straight(s: &Surface, wo: Vec3) -> Vec3 {
+    if !transmits_delta(s) {
+        return Vec3::ZERO;
+    }
+    interface_at(s, cos_to(s.ns, wo)).transmitted * (1.0 - coat_share(s, wo))
+}
+
 /// Approximate share of light from everywhere that leaves towards `wo`, transmission included.
 pub fn lobes_albedo(s: &Surface, wo: Vec3) -> Vec3 {
     let lobes = lobes_at(s, wo);

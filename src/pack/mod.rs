@@ -3,6 +3,7 @@
 mod build;
 pub mod camera;
 mod lights;
+mod panes;
 mod photons;
 mod shutter;
 #[cfg(test)]

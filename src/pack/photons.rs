@@ -113,8 +113,14 @@ fn is_smooth_somewhere(packed: &PackedScene, material: &Material) -> bool {
         || material.transmission == 1.0
         || material.base_color[..3] == [0.0; 3]
         || (is_textured && material.metallic.max(material.transmission) > 0.0);
-    let is_polished = pure && alpha < POLISHED_ALPHA;
+    // Nothing but light that goes straight through.
+    let is_invisible = material.ior == 1.0
+        && material.transmission == 1.0
+        && material.metallic == 0.0
+        && !is_textured;
+    let is_polished = pure && alpha < POLISHED_ALPHA && !is_invisible;
     let mirrors = alpha < DELTA_ALPHA
+        && !is_invisible
         && (material.metallic > 0.0 || material.specular > 0.0 || material.transmission > 0.0);
     let bends = material.transmission > 0.0
         && material.flags & MATERIAL_THIN_WALLED == 0

@@ -123,6 +123,8 @@ shared! {
     pub const FRAME_NO_SHARING: u32 = 1024;
     /// Without the saving `photons`: the eye's paths look for caustics.
     pub const FRAME_NO_PHOTONS: u32 = 512;
+    /// Some material is a pane ([`MATERIAL_PANE`]).
+    pub const FRAME_PANES: u32 = 2048;
 
     #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
     pub struct Vertex {
@@ -161,6 +163,8 @@ shared! {
     pub const MATERIAL_QUAD_LIGHT: u32 = 64;
     /// Some texture is referenced.
     pub const MATERIAL_TEXTURED: u32 = 128;
+    /// Somewhere light goes straight through: a smooth thin wall, or a volume of index 1.
+    pub const MATERIAL_PANE: u32 = 256;
 
     pub const TEXTURE_SRGB: u32 = 1;
     pub const TEXTURE_NEAREST: u32 = 2;

@@ -7,6 +7,7 @@ mod extremes;
 mod form_factor;
 mod furnace;
 mod lens;
+mod panes;
 mod perfect_proxy;
 mod photograph;
 mod photons;

@@ -121,8 +121,6 @@ const TRACES: &[Trace] = &[
         feature: "alpha",
         kernel: "kernel_trace",
         with: &[
-            "gpu_buffers__materials",
-            "gpu_buffers__vertices",
             "fn cpu_request__meets",
             "fn material_surface__surface_alpha",
         ],
@@ -272,6 +270,23 @@ const TRACES: &[Trace] = &[
         feature: "sharing",
         kernel: "kernel_share",
         with: &["fn cpu_sharing__link_points", "fn cpu_request__answer"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "panes",
+        with: &[
+            "fn cpu_panes__pass_straight",
+            "fn cpu_panes__is_pane",
+            "cpu_state__path_passed_m",
+        ],
+        beside: &["transmission", "rough_specular"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "panes",
+        kernel: "kernel_trace",
+        with: &["fn cpu_panes__pass", "fn material_bsdf__bsdf_straight"],
+        beside: &["transmission", "rough_specular"],
         ..ADVANCE
     },
     Trace {
