@@ -7,7 +7,7 @@ import package::packed::records::{SIDE_REAL, SIDE_VIRTUAL};
 import package::work::list::TILE_PLACES;
 import package::film::sums::is_unusable;
 import package::light::cones::{cone_pdf, cones_at};
-import package::material::scatter::lambert_cos;
+import package::material::scatter::{lambert_cos, terminator};
 import package::math::{INV_PI, dot3, length3, safe_sqrt};
 import package::cpu::panes::blocks;
 import package::cpu::request::answer;
@@ -47,7 +47,7 @@ fn link_to(first: FirstVertex, point: SharedPoint, kind: u32) -> Link {
     if kind != POINT_RECURSION {
         drawn = first.cone_probability * cone_pdf(cones_at(first.origin.position, first.ns), direction);
     }
-    return Link(cosine * solid_angle, drawn * solid_angle);
+    return Link(cosine * terminator(first.ng, first.ns, direction) * solid_angle, drawn * solid_angle);
 }
 
 fn sees(st: ptr<function, PathState>, first: FirstVertex, point: SharedPoint, kind: u32, thread: u32) -> bool {

@@ -3,7 +3,7 @@
 import package::packed::records::{MATERIAL_LAMBERTIAN, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT};
 import package::material::interface::{max3, surface_index, thin_walled};
 import package::material::lobes::{lobes_albedo, lobes_are_delta, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample, lobes_straight};
-import package::material::scatter::{BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, lambert_cos, sample_lambert};
+import package::material::scatter::{BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, kept_at_terminator, lambert_cos, sample_lambert};
 import package::math::INV_PI;
 import package::material::surface::Surface;
 
@@ -21,7 +21,7 @@ fn bsdf_eval(s: Surface, wo: vec3<f32>, wi: vec3<f32>) -> BsdfEval {
         }
     }
     let pdf = lambert_cos(s.ng, s.ns, wi) * INV_PI;
-    return BsdfEval(s.base_color * pdf, pdf);
+    return BsdfEval(s.base_color * (pdf * kept_at_terminator(s, wi)), pdf);
 }
 
 fn bsdf_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
@@ -38,7 +38,7 @@ fn bsdf_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
     if pdf <= 0.0 {
         return SAMPLE_NOTHING;
     }
-    return BsdfSample(wi, s.base_color, pdf, false, false, true);
+    return BsdfSample(wi, s.base_color * kept_at_terminator(s, wi), pdf, false, false, true);
 }
 
 fn bsdf_is_delta(s: Surface) -> bool {

@@ -7,7 +7,8 @@ import package::material::interface::{
     thin_walled, transmits_delta,
 };
 import package::material::scatter::{
-    BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, delta_sample, lambert_cos, mirrored_at, on_side, reflected_about, sample_lambert,
+    BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, delta_sample, kept_at_terminator, lambert_cos, mirrored_at, on_side, reflected_about,
+    sample_lambert,
 };
 import package::math::{INV_PI, dot3};
 import package::material::normal::unit;
@@ -89,7 +90,8 @@ fn eval_reflection(s: Surface, lobes: Lobes, wo: vec3<f32>, wi: vec3<f32>) -> Bs
         let cos_half = 0.5 * sqrt(dot3(sum, sum));
         let cosine = lambert_cos(s.ng, s.ns, wi) * INV_PI;
         let passed = 1.0 - max3(opaque_fresnel(s, cos_half));
-        f_cos += diffuse_color(s) * (under * passed * cosine);
+        let kept = kept_at_terminator(s, wi);
+        f_cos += diffuse_color(s) * (under * passed * cosine * kept);
         pdf += lobes.p_diffuse * cosine;
     }
     if lobes.p_interface > 0.0 && !reflects_delta(s) {
@@ -137,7 +139,9 @@ fn lobes_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
         return SAMPLE_NOTHING;
     }
     if u.x < lobes.p_diffuse {
-        return mixture_sample(s, lobes, wo, sample_lambert(s, u.y, u.z));
+        let wi = sample_lambert(s, u.y, u.z);
+        if dot3(s.ng, wi) > 0.0 { return mixture_sample(s, lobes, wo, wi); }
+        return SAMPLE_NOTHING;
     }
     let rest = u.x - lobes.p_diffuse;
     @if(clearcoat) {

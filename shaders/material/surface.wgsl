@@ -4,7 +4,7 @@ import package::gpu::buffers::{frame, materials, photo_albedo, texture_refs, tri
 import package::packed::materials::Material;
 import package::packed::records::{
     Vertex, TEXTURE_UV1, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
-    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
+    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, PHOTO_PATCHES,
 };
 import package::shared::NONE;
 @if(photo_albedo) import package::camera::lens::camera_project;
@@ -98,7 +98,19 @@ fn photo_albedo_at(position: vec3<f32>, object: u32) -> vec3<f32> {
             return entry.xyz;
         }
     }
-    return photo_albedo[frame.width * frame.height + object].xyz;
+    let first = frame.width * frame.height + object * (2u * PHOTO_PATCHES);
+    var sum = vec3<f32>(0.0);
+    var weights = 0.0;
+    for (var patch_ = 0u; patch_ < PHOTO_PATCHES; patch_++) {
+        let albedo = photo_albedo[first + 2u * patch_];
+        let place = photo_albedo[first + 2u * patch_ + 1u];
+        let away = position - place.xyz;
+        let nearness = 1.0 / max(dot3(away, away) + place.w, NO_DISTANCE2);
+        let weight = albedo.w * (nearness * nearness);
+        sum += albedo.xyz * weight;
+        weights += weight;
+    }
+    return sum * (1.0 / max(weights, NO_DISTANCE2));
 }
 
 fn perturbed(map: u32, scale: f32, normal: vec3<f32>, v0: Vertex, v1: Vertex, v2: Vertex, b: vec3<f32>) -> vec3<f32> {

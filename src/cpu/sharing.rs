@@ -21,7 +21,7 @@ use super::state::*;
 use super::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS};
 use crate::film::is_unusable;
 use crate::light::cones::{cone_pdf, cones_at};
-use crate::material::scatter::lambert_cos;
+use crate::material::scatter::{lambert_cos, terminator};
 use crate::math::{INV_PI, dot3, length3, safe_sqrt};
 use crate::packed::{Frame, NONE, PackedScene, SIDE_REAL, SIDE_VIRTUAL};
 use crate::shared::shared;
@@ -91,7 +91,7 @@ fn link_to(frame: &Frame, first: &FirstVertex, point: &SharedPoint, kind: u32) -
         first.cone_probability * cone_pdf(&cones, direction)
     };
     Link {
-        transfer: cosine * solid_angle,
+        transfer: cosine * terminator(first.ng, first.ns, direction) * solid_angle,
         density: drawn * solid_angle,
     }
 }

@@ -8,7 +8,8 @@ use super::lobes::{
     lobes_straight,
 };
 use super::scatter::{
-    BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, lambert_cos, sample_lambert,
+    BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, kept_at_terminator, lambert_cos,
+    sample_lambert,
 };
 use super::surface::Surface;
 use crate::math::INV_PI;
@@ -26,7 +27,7 @@ pub fn bsdf_eval(s: &Surface, wo: Vec3, wi: Vec3) -> BsdfEval {
     if bsdf_is_lambertian(s) {
         let pdf = lambert_cos(s.ng, s.ns, wi) * INV_PI;
         return BsdfEval {
-            f_cos: s.base_color * pdf,
+            f_cos: s.base_color * (pdf * kept_at_terminator(s, wi)),
             pdf,
         };
     }
@@ -48,7 +49,7 @@ pub fn bsdf_sample(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
     }
     BsdfSample {
         wi,
-        weight: s.base_color,
+        weight: s.base_color * kept_at_terminator(s, wi),
         pdf,
         delta: false,
         transmitted: false,

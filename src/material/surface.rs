@@ -8,7 +8,7 @@ use crate::math::{cross3, dot3, safe_sqrt};
 use crate::packed::{
     MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
     MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, Material, NONE,
-    PackedScene, TEXTURE_UV1, Vertex, xyz,
+    PHOTO_PATCHES, PackedScene, TEXTURE_UV1, Vertex, xyz,
 };
 use crate::shared::shared;
 
@@ -26,6 +26,8 @@ shared! {
     const SLIMMEST: f32 = 1e-4;
     /// Relative difference up to which a depth in `photo_albedo` is the point's own.
     const PHOTO_DEPTH_TOLERANCE: f32 = 0.02;
+    /// Squared distances and weights below it are none.
+    const NO_DISTANCE2: f32 = 1e-12;
 
     /// What the scattering functions need to know about a point.
     #[derive(Clone, Copy, Debug)]
@@ -146,7 +148,8 @@ pub fn triangle_emission(scene: &PackedScene, triangle: u32, u: f32, v: f32) -> 
     emission * surface_alpha(scene, hit)
 }
 
-/// Albedo that the photograph's pixel over `position` was found to have: the object's median where the camera does not see the point.
+/// Albedo that the photograph's pixel over `position` was found to have. Where the camera does not see the point, the mean over what it sees of
+/// the object, nearer parts before farther ones.
 fn photo_albedo_at(scene: &PackedScene, position: Vec3, object: u32) -> Vec3 {
     let frame = &scene.frame;
     let seen = camera_project(frame, position);
@@ -157,8 +160,18 @@ fn photo_albedo_at(scene: &PackedScene, position: Vec3, object: u32) -> Vec3 {
             return Vec3::new(r, g, b);
         }
     }
-    let [r, g, b, _] = scene.photo_albedo[(frame.width * frame.height + object) as usize];
-    Vec3::new(r, g, b)
+    let first = frame.width * frame.height + object * (2 * PHOTO_PATCHES);
+    let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+    for patch in 0..PHOTO_PATCHES {
+        let albedo = scene.photo_albedo[(first + 2 * patch) as usize];
+        let place = scene.photo_albedo[(first + 2 * patch + 1) as usize];
+        let away = position - xyz(place);
+        let nearness = 1.0 / (dot3(away, away) + place[3]).max(NO_DISTANCE2);
+        let weight = albedo[3] * (nearness * nearness);
+        sum += xyz(albedo) * weight;
+        weights += weight;
+    }
+    sum * (1.0 / weights.max(NO_DISTANCE2))
 }
 
 /// `normal` as the normal map of slot `map` perturbs it; unchanged without a map.

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 use super::{
-    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
-    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE,
-    PackedScene, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1, TEXTURE_WRAP_U_SHIFT,
-    TEXTURE_WRAP_V_SHIFT, TextureRef, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT,
+    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_NORMAL_MAPPED,
+    MATERIAL_PHOTO_ALBEDO, MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED,
+    MATERIAL_UNLIT, NONE, PackedScene, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1,
+    TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT, TextureRef, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT,
 };
 use crate::scene::{self, AlphaMode, Texture, Wrap};
 use crate::shared::shared;
@@ -221,6 +221,7 @@ fn flags(m: &scene::Material, from_photo: bool) -> u32 {
         | bit(m.thin_walled, MATERIAL_THIN_WALLED)
         | bit(from_photo, MATERIAL_PHOTO_ALBEDO)
         | bit(m.textures().next().is_some(), MATERIAL_TEXTURED)
+        | bit(m.normal_texture.is_some(), MATERIAL_NORMAL_MAPPED)
 }
 
 /// KHR_materials_volume: white light becomes `color` after `distance_m`. A black channel absorbs within a thousandth of it.

@@ -34,7 +34,8 @@ pub struct PackedScene {
     /// Cumulative distributions of the environment's cells (see `light::environment_table::EnvironmentTable`).
     pub env_cdf: Vec<f32>,
     /// For `albedo = "from-photo"`, empty where unused: albedo of the photograph's pixels and the depth (metres along the axis) it was seen
-    /// at, then for each scene object the median that its points take which the camera does not see.
+    /// at, then for each scene object its patches, [`records::PHOTO_PATCHES`] pairs: mean albedo of the pixels that see a part of it and how many
+    /// they are; their mean position, metres, and mean squared distance from it.
     pub photo_albedo: Vec<[f32; 4]>,
     /// One word a pixel: what the pilot found (see [`PixelInfo`]).
     pub pixels: Vec<PixelInfo>,

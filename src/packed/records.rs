@@ -7,6 +7,9 @@ use glam::Vec3;
 use crate::shared::shared;
 
 shared! {
+    /// Patches of an object that the photograph shows: what its other points take their albedo from.
+    pub const PHOTO_PATCHES: u32 = 16;
+
     /// Bounding spheres of the virtual geometry, at most this many.
     pub const MAX_SPHERES: usize = 16;
 
@@ -163,6 +166,8 @@ shared! {
     pub const MATERIAL_QUAD_LIGHT: u32 = 64;
     /// Some texture is referenced.
     pub const MATERIAL_TEXTURED: u32 = 128;
+    /// A normal map tilts the shading normal.
+    pub const MATERIAL_NORMAL_MAPPED: u32 = 512;
     /// Somewhere light goes straight through: a smooth thin wall, or a volume of index 1.
     pub const MATERIAL_PANE: u32 = 256;
 

@@ -7,8 +7,11 @@ use crate::cpu;
 use crate::film::Film;
 use crate::gpu::Changed;
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO};
-use crate::scene::{BackendChoice, Exposure};
+use crate::scene::{BackendChoice, Composite, Exposure};
 use crate::work::{Meter, Phase, Watcher};
+
+/// Share of the proxy's pixels above which a limited albedo is told.
+const MOSTLY: f64 = 0.5;
 
 impl Renderer {
     /// Takes up the packed scene after an edit.
@@ -82,7 +85,19 @@ impl Renderer {
             }
         }
         if from_photo {
-            photo_albedo::estimate_photo_albedo(&mut core.packed, photo, watcher);
+            let limited = photo_albedo::estimate_photo_albedo(&mut core.packed, photo, watcher);
+            let is_additive = core.scene.settings.composite == Composite::Additive;
+            if limited > MOSTLY && is_additive {
+                let albedo = std::mem::take(&mut core.packed.photo_albedo);
+                let ev = photo_albedo::fit_exposure_ev(&mut core.packed, photo, watcher);
+                core.packed.photo_albedo = albedo;
+                let auto = ev.map_or(String::new(), |ev| format!(" (here {ev:.2})"));
+                core.notes.push(format!(
+                    "warning: {:.0}% of the proxy's albedo lies at its limit: the light does not fit the photograph, and shadows will be \
+                     wrong; set exposure_ev = \"auto\"{auto}, or composite = \"quotient\"",
+                    100.0 * limited
+                ));
+            }
         }
     }
 

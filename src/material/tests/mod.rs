@@ -4,6 +4,7 @@ mod energy;
 mod fresnel;
 mod kinds;
 mod surface;
+mod terminator;
 mod texture;
 mod twins;
 
