@@ -4,8 +4,9 @@ import package::gpu::buffers::{frame, pixels};
 import package::packed::records::{FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_SHARES};
 import package::shared::NONE;
 import package::material::bsdf::bsdf_albedo;
+import package::light::backdrop::{backdrop_of_pixel, backdrop_radiance};
 import package::light::cones::{cone_pdf, cones_at};
-import package::cpu::contribution::{accumulate, density_weight, events_after, left_to_photons, sample_key};
+import package::cpu::contribution::{accumulate, density_weight, events_after, left_to_photons, sample_key, sees_backdrop};
 import package::light::environment::{env_radiance, share_left_to_eye};
 import package::camera::lens::camera_ray_from;
 import package::light::lights::env_arriving;
@@ -13,7 +14,7 @@ import package::math::{dot3, hash_combine, hash_u32};
 import package::camera::sampler::sample_4d;
 import package::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
 import package::cpu::state::{
-    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_FROM_SHARED, EVENT_PASSED, EVENT_SCATTERED, FAR, FirstHit, Hits, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE,
+    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_FROM_LENS, EVENT_FROM_SHARED, EVENT_PASSED, EVENT_SCATTERED, FAR, FirstHit, Hits, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE,
     PENDING_BEHIND_PANE, PENDING_NEXT, PENDING_REAL, PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED,
     REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_VIRTUAL, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
     REQUEST_VIRTUAL_THEN_REAL, RealPath, STAGE_DIFFERENCE_BSDF, STAGE_DIFFERENCE_CONE, STAGE_DIFFERENCE_SHADOW, STAGE_DONE,
@@ -143,6 +144,7 @@ fn primary_real(st: ptr<function, PathState>) {
     if virtual_is_nearer((*st).hits) {
         path_results[(*st).lane].mask = 1u;
         (*st).path.mode = MODE_MIXED;
+        @if(backdrop) { (*st).path.events |= EVENT_FROM_LENS; }
         plan_vertex(st, (*st).hits.in_virtual);
     } else if (*st).hits.in_real.triangle != NONE {
         (*st).path.mode = MODE_DIFFERENCE;
@@ -281,6 +283,9 @@ fn paper_behind(st: ptr<function, PathState>) {
     }
     (*st).path.mode = MODE_MIXED;
     @if(panes) { (*st).path.events |= EVENT_FROM_SHARED; }
+    @if(backdrop) {
+        if (*st).ray.depth == 1u { (*st).path.events |= EVENT_FROM_LENS; }
+    }
     plan_vertex(st, (*st).hits.in_virtual);
 }
 
@@ -295,9 +300,23 @@ fn path_escape(st: ptr<function, PathState>) {
 }
 
 fn escaping_light(st: ptr<function, PathState>) -> vec3<f32> {
+    @if(backdrop) {
+        if sees_backdrop(st) {
+            var weight = 1.0;
+            if (*st).path.density != DELTA_DENSITY {
+                weight = density_weight((*st).path.density, env_arriving((*st).ray.direction).pdf);
+            }
+            return (*st).path.throughput * backdrop_behind(st) * weight;
+        }
+    }
     if (*st).path.density == DELTA_DENSITY { return (*st).path.throughput * env_radiance((*st).ray.direction); }
     let arriving = env_arriving((*st).ray.direction);
     return (*st).path.throughput * arriving.radiance * density_weight((*st).path.density, arriving.pdf);
+}
+
+fn backdrop_behind(st: ptr<function, PathState>) -> vec3<f32> {
+    if (*st).ray.depth == 1u { return backdrop_of_pixel((*st).path.pixel); }
+    return backdrop_radiance((*st).ray.origin.position, (*st).ray.direction);
 }
 
 fn path_shadow(st: ptr<function, PathState>) {

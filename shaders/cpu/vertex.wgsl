@@ -8,8 +8,11 @@ import package::packed::records::{
 import package::shared::NONE;
 import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample, bsdf_straight};
 import package::camera::sampler::{SampleSet, fourth, pair, second_pair, third};
+import package::light::backdrop::backdrop_radiance;
 import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres};
-import package::cpu::contribution::{accumulate, density_weight, draw, events_after, left_to_photons, vertex_left_to_photons};
+import package::cpu::contribution::{
+    accumulate, density_weight, draw, events_after, from_lens_after, left_to_photons, sees_backdrop, vertex_left_to_photons,
+};
 import package::light::environment::share_left_to_eye;
 import package::cpu::panes::{distance_from_vertex, draw_at_pane, is_shared, may_leave_no_vertex, pass_straight, transmittance};
 import package::cpu::points::{keep_first_vertex, offer_point};
@@ -19,7 +22,7 @@ import package::cpu::contribution::{
 import package::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 import package::math::{dot3, safe_sqrt};
 import package::cpu::state::{
-    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_FROM_SHARED, EVENT_LIGHT_LEFT_TO_PATH, EVENT_PASSED, DifferenceRay, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
+    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_FROM_LENS, EVENT_FROM_SHARED, EVENT_LIGHT_LEFT_TO_PATH, EVENT_PASSED, DifferenceRay, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
     PENDING_SHADOW, PathState, REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED,
     REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL, RayOrigin, Segment, path_differences, path_nexts,
 };
@@ -168,7 +171,12 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, technique
         let choice_coin = second_pair(u);
         index = light_select(choice_coin.x, choice_coin.y);
     }
-    let l = light_sample(index, s.position, pair(u));
+    var l = light_sample(index, s.position, pair(u));
+    @if(backdrop) {
+        if lights[index].kind == LIGHT_ENVIRONMENT && sees_backdrop(st) && from_lens_after(st, s, false, bsdf_is_polished(s)) != 0u {
+            l.radiance = backdrop_radiance(s.position, l.direction);
+        }
+    }
     var contribution = light_contribution(st, s, wo, techniques, l);
     @if(photons) {
         if vertex_left_to_photons(st, s) { contribution *= light_left_to_eye(index, l.direction); }
@@ -288,13 +296,15 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
         }
     }
     var events = (*st).path.events;
-    @if(photons) {
+    @if(backdrop) let from_lens = from_lens_after(st, s, b.delta, b.delta || bsdf_is_polished(s));
+    @if(photons || backdrop) {
+        let smooth_ = b.delta || bsdf_is_polished(s);
         if !straight {
-            let smooth_ = b.delta || bsdf_is_polished(s);
             events = events_after(events, (*st).ray.depth, (*st).ray.side, smooth_);
         }
     }
     @if(panes) { events &= ~(EVENT_PASSED | EVENT_FROM_SHARED); }
+    @if(backdrop) { events = (events & ~EVENT_FROM_LENS) | from_lens; }
     var segment = Segment(b.wi, select(b.pdf, DELTA_DENSITY, b.delta), throughput, medium);
     @if(!paper) {
         if difference {

@@ -230,6 +230,10 @@ fn lobes_are_polished(s: Surface) -> bool {
         && (s.clearcoat == 0.0 || s.coat_alpha < POLISHED_ALPHA);
 }
 
+fn lobes_are_diffuse(s: Surface) -> bool {
+    return max3(diffuse_color(s)) > 0.0;
+}
+
 fn lobes_are_delta(s: Surface) -> bool {
     return max3(diffuse_color(s)) == 0.0 && reflects_delta(s) && (s.clearcoat == 0.0 || coat_delta(s));
 }

@@ -16,6 +16,7 @@ use crate::accel::Hit;
 use crate::camera::lens::camera_ray_from;
 use crate::camera::sampler::sample_4d;
 use crate::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
+use crate::light::backdrop::{backdrop_of_pixel, backdrop_radiance};
 use crate::light::cones::{cone_pdf, cones_at};
 use crate::light::environment::{env_radiance, share_left_to_eye};
 use crate::light::lights::env_arriving;
@@ -178,6 +179,7 @@ fn primary_real(st: &mut PathState) {
     if virtual_is_nearer(&st.hits) {
         st.result.mask = 1;
         st.path.mode = MODE_MIXED;
+        st.path.events |= EVENT_FROM_LENS;
         plan_vertex(st, st.hits.in_virtual);
     } else if st.hits.in_real.triangle != NONE {
         // Without throughput the sample has no turn, and the vertex only fills the planes.
@@ -340,6 +342,9 @@ fn paper_behind(scene: &PackedScene, st: &mut PathState) {
     }
     st.path.mode = MODE_MIXED;
     st.path.events |= EVENT_FROM_SHARED;
+    if st.ray.depth == 1 {
+        st.path.events |= EVENT_FROM_LENS;
+    }
     plan_vertex(st, st.hits.in_virtual);
 }
 
@@ -357,11 +362,22 @@ fn path_escape(scene: &PackedScene, st: &mut PathState) {
 }
 
 fn escaping_light(scene: &PackedScene, st: &PathState) -> Vec3 {
+    let backdrop = sees_backdrop(scene, st).then(|| backdrop_behind(scene, st));
     if st.path.density == DELTA_DENSITY {
-        return st.path.throughput * env_radiance(scene, st.ray.direction);
+        let radiance = backdrop.unwrap_or_else(|| env_radiance(scene, st.ray.direction));
+        return st.path.throughput * radiance;
     }
-    let (radiance, pdf) = env_arriving(scene, st.ray.direction);
+    let (environment, pdf) = env_arriving(scene, st.ray.direction);
+    let radiance = backdrop.unwrap_or(environment);
     st.path.throughput * radiance * density_weight(st.path.density, pdf)
+}
+
+/// What the path sees of the photograph. Past panes alone it is what its own pixel shows.
+fn backdrop_behind(scene: &PackedScene, st: &PathState) -> Vec3 {
+    if st.ray.depth == 1 {
+        return backdrop_of_pixel(scene, st.path.pixel);
+    }
+    backdrop_radiance(scene, st.ray.origin.position, st.ray.direction)
 }
 
 fn path_shadow(scene: &PackedScene, st: &mut PathState) {

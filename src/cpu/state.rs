@@ -95,6 +95,9 @@ shared! {
     /// What the light of the present shadow ray sends through panes of the real world is found by the path that goes through them.
     pub const EVENT_LIGHT_LEFT_TO_PATH: u32 = 128;
 
+    /// All vertices so far are virtual and scatter no light diffusely: the camera looks through them at what lies behind.
+    pub const EVENT_FROM_LENS: u32 = 256;
+
     /// Answer to a shadow ray, in the place of a triangle: it has passed panes alone, and the share of light that comes through stands in
     /// the hit's `t`, `u`, `v`.
     pub const PANES: u32 = 0xffff_fffe;

@@ -10,6 +10,7 @@ use super::panes::{
 use super::points::{keep_first_vertex, offer_point};
 use super::state::*;
 use crate::camera::sampler::SampleSet;
+use crate::light::backdrop::backdrop_radiance;
 use crate::light::blocking::light_may_be_blocked;
 use crate::light::cones::{
     Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres,
@@ -234,7 +235,13 @@ fn next_event(
     {
         return;
     }
-    let l = light_sample(scene, index, s.position, u.pair());
+    let mut l = light_sample(scene, index, s.position, u.pair());
+    if scene.lights[index as usize].kind == LIGHT_ENVIRONMENT
+        && sees_backdrop(scene, st)
+        && from_lens_after(st, s, false, bsdf_is_polished(s)) != 0
+    {
+        l.radiance = backdrop_radiance(scene, s.position, l.direction);
+    }
     let mut contribution = light_contribution(scene, st, s, wo, techniques, &l);
     if vertex_left_to_photons(scene, st, s) {
         contribution *= light_left_to_eye(scene, index, l.direction);
@@ -407,13 +414,14 @@ fn plan_continuation(
         pass_straight(st, b.wi, throughput, medium);
         return;
     }
+    let smooth = b.delta || bsdf_is_polished(s);
     let events = if straight {
         st.path.events
     } else {
-        let smooth = b.delta || bsdf_is_polished(s);
         events_after(st.path.events, st.ray.depth, st.ray.side, smooth)
     };
-    let events = events & !(EVENT_PASSED | EVENT_FROM_SHARED);
+    let from_lens = from_lens_after(st, s, b.delta, smooth);
+    let events = events & !(EVENT_PASSED | EVENT_FROM_SHARED | EVENT_FROM_LENS) | from_lens;
     let mut segment = Segment {
         direction: b.wi,
         density: if b.delta { DELTA_DENSITY } else { b.pdf },

@@ -36,6 +36,7 @@ pub struct SceneParts<'a> {
     pub env_texels: &'a [f32],
     pub env_cdf: &'a [f32],
     pub photo_albedo: &'a [[f32; 4]],
+    pub backdrop: &'a [f32],
     pub pixels: &'a [PixelInfo],
     /// Both worlds, the real one first, each as [`WorldBvh::gpu_nodes`].
     pub bvh_nodes: [[&'a [[[u32; 4]; 5]]; 3]; 2],
@@ -57,6 +58,7 @@ impl Default for SceneParts<'_> {
             env_texels: &[],
             env_cdf: &[],
             photo_albedo: &[],
+            backdrop: &[],
             pixels: &[],
             bvh_nodes: [[&[]; 3]; 2],
             bvh_leaves: [[&[]; 2]; 2],
@@ -79,6 +81,7 @@ impl<'a> From<&'a PackedScene> for SceneParts<'a> {
             env_texels: &scene.env_texels,
             env_cdf: &scene.env_cdf,
             photo_albedo: &scene.photo_albedo,
+            backdrop: &scene.backdrop,
             pixels: &scene.pixels,
             bvh_nodes: worlds.map(WorldBvh::gpu_nodes),
             bvh_leaves: worlds.map(WorldBvh::gpu_leaves),
@@ -184,7 +187,7 @@ impl Array<'_> {
     }
 }
 
-fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 12] {
+fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 13] {
     use Changed::{All, Moving, View, Virtual};
     let array = |name, what, pieces| Array { name, what, pieces };
     let SceneParts {
@@ -199,6 +202,7 @@ fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 12] {
         env_texels,
         env_cdf,
         photo_albedo,
+        backdrop,
         pixels,
         bvh_nodes: [[real_roots, real_nodes, _], [roots, nodes, moving_nodes]],
         bvh_leaves: [[real_leaves, _], [leaves, moving_leaves]],
@@ -231,6 +235,7 @@ fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 12] {
             "albedo of the photograph",
             vec![piece(View, photo_albedo)],
         ),
+        array("backdrop", "photograph", vec![piece(View, backdrop)]),
         array("pixels", "pixels", vec![piece(View, pixels)]),
         array(
             "bvh_nodes",

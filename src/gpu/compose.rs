@@ -76,6 +76,8 @@ features! {
     photons,
     /// Light goes straight through some material.
     panes,
+    /// Virtual objects show the photograph behind them.
+    backdrop,
 }
 
 impl Features {
@@ -123,6 +125,7 @@ impl Features {
             sharing: (scene.pixels.iter()).any(|info| info.flags & packed::PIXEL_SHARES != 0),
             photons: cpu::contribution::photons_traced(&scene.frame),
             panes: scene.frame.flags & packed::FRAME_PANES != 0,
+            backdrop: scene.frame.flags & packed::FRAME_BACKDROP != 0,
         }
     }
 }
@@ -159,6 +162,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &camera::shutter::SHARED,
     &camera::splat::SHARED,
     &cpu::panes::SHARED,
+    &light::backdrop::SHARED,
     &light::cones::SHARED,
     &light::environment::SHARED,
     &light::lights::SHARED,

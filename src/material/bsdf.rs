@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::interface::{max3, surface_index, thin_walled};
 use super::lobes::{
-    lobes_albedo, lobes_are_delta, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample,
-    lobes_straight,
+    lobes_albedo, lobes_are_delta, lobes_are_diffuse, lobes_are_polished, lobes_bound, lobes_eval,
+    lobes_sample, lobes_straight,
 };
 use super::scatter::{
     BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, kept_at_terminator, lambert_cos,
@@ -66,6 +66,11 @@ pub fn bsdf_is_delta(s: &Surface) -> bool {
         return false;
     }
     lobes_are_delta(s)
+}
+
+/// Some of the light that it scatters goes everywhere.
+pub fn bsdf_is_diffuse(s: &Surface) -> bool {
+    bsdf_is_lambertian(s) || lobes_are_diffuse(s)
 }
 
 /// Nothing but lobes that mirror or bend light with little blur: as far as photons go, it is smooth.

@@ -285,6 +285,10 @@ pub fn lobes_are_polished(s: &Surface) -> bool {
         && (s.clearcoat == 0.0 || s.coat_alpha < POLISHED_ALPHA)
 }
 
+pub fn lobes_are_diffuse(s: &Surface) -> bool {
+    max3(diffuse_color(s)) > 0.0
+}
+
 /// Nothing but delta lobes.
 pub fn lobes_are_delta(s: &Surface) -> bool {
     max3(diffuse_color(s)) == 0.0 && reflects_delta(s) && (s.clearcoat == 0.0 || coat_delta(s))

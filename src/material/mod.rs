@@ -17,7 +17,8 @@ pub(crate) mod texture;
 
 pub use bsdf::{
     bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_index_ratio, bsdf_is_delta,
-    bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample, bsdf_straight,
+    bsdf_is_diffuse, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample,
+    bsdf_straight,
 };
 pub use interface::{DELTA_ALPHA, transmits_unblurred};
 pub use lobes::POLISHED_ALPHA;

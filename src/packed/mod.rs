@@ -37,6 +37,8 @@ pub struct PackedScene {
     /// at, then for each scene object its patches, [`records::PHOTO_PATCHES`] pairs: mean albedo of the pixels that see a part of it and how many
     /// they are; their mean position, metres, and mean squared distance from it.
     pub photo_albedo: Vec<[f32; 4]>,
+    /// Linear values of the photograph's pixels, three floats each, row-major, where paths may see it (`FRAME_BACKDROP`); else empty.
+    pub backdrop: Vec<f32>,
     /// One word a pixel: what the pilot found (see [`PixelInfo`]).
     pub pixels: Vec<PixelInfo>,
     /// What bounds moving objects over the whole time of the shutter; empty where nothing moves: then the frame's spheres do.
@@ -88,6 +90,7 @@ impl PackedScene {
             env_texels: Vec::new(),
             env_cdf: Vec::new(),
             photo_albedo: Vec::new(),
+            backdrop: Vec::new(),
             pixels: Vec::new(),
             swept_spheres: Vec::new(),
             material_table: materials::MaterialTable::default(),

@@ -89,7 +89,8 @@ shared! {
         pub photon_spheres: [[f32; 4]; MAX_PHOTON_SPHERES],
         /// 0: no photons are traced.
         pub photon_sphere_count: u32,
-        pub pad: u32,
+        /// 1 / distance of the backdrop along the view axis; 0: infinitely far.
+        pub inv_backdrop_distance: f32,
         pub pad_end: [u32; 2],
     }
 
@@ -128,6 +129,8 @@ shared! {
     pub const FRAME_NO_PHOTONS: u32 = 512;
     /// Some material is a pane ([`MATERIAL_PANE`]).
     pub const FRAME_PANES: u32 = 2048;
+    /// Paths that leave virtual objects see the photograph.
+    pub const FRAME_BACKDROP: u32 = 4096;
 
     #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
     pub struct Vertex {

@@ -113,8 +113,14 @@ impl Renderer {
         let core = &mut self.core;
         let without = core.options.without;
         without.apply_to_frame(&mut core.packed.frame);
+        core.packed.set_backdrop(&core.scene);
         cpu::pilot(&mut core.packed, &meter);
         without.apply_to_pixels(&mut core.packed.pixels);
+        let photons = core.packed.photons_per_ray > 0;
+        let note = core.packed.black_shadows(photons);
+        core.notes
+            .extend(note.filter(|note| !core.notes.contains(note)));
+        core.backdrop_share = cpu::backdrop_share(&mut core.packed);
         core.film = Film::new(
             core.film.width,
             core.film.height,

@@ -2,7 +2,7 @@
 
 use super::error::Result;
 use super::reader::{Choice, Node, Table};
-use super::{BackendChoice, Composite, Estimator, Exposure, SamplerKind, Settings, Side};
+use super::{Backdrop, BackendChoice, Composite, Estimator, Exposure, SamplerKind, Settings, Side};
 
 impl Choice for Side {
     const CHOICES: &'static [(&'static str, Self)] =
@@ -44,6 +44,7 @@ impl Default for Settings {
             composite: Composite::Additive,
             backend: BackendChoice::Auto,
             exposure: Exposure::Ev(0.0),
+            backdrop: Backdrop::Photograph(None),
         }
     }
 }
@@ -91,10 +92,15 @@ const KEYS: &[&str] = &[
     "backend",
 ];
 
-/// `[render]`; the exposure stands in `[photo]`.
-pub(super) fn read_settings(root: &Table, exposure: Exposure) -> Result<Settings> {
+/// `[render]`; exposure and backdrop stand in `[photo]`.
+pub(super) fn read_settings(
+    root: &Table,
+    exposure: Exposure,
+    backdrop: Backdrop,
+) -> Result<Settings> {
     let mut settings = Settings {
         exposure,
+        backdrop,
         ..Settings::default()
     };
     if let Some(table) = root.table("render", "[render]", KEYS)? {

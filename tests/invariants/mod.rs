@@ -1,6 +1,7 @@
 //! The invariants of the design: what every picture must keep, whatever the scene. Each check is a function of the backend, runs on the
 //! CPU, and has a control that shows it can fail.
 
+mod backdrop;
 mod emitters;
 mod estimators;
 mod extremes;

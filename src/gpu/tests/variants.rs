@@ -261,7 +261,6 @@ const TRACES: &[Trace] = &[
         feature: "photons",
         with: &[
             "fn cpu_contribution__left_to_photons",
-            "fn cpu_contribution__events_after",
             "fn cpu_vertex__light_left_to_eye",
         ],
         ..ADVANCE
@@ -287,6 +286,15 @@ const TRACES: &[Trace] = &[
         kernel: "kernel_trace",
         with: &["fn cpu_panes__pass", "fn material_bsdf__bsdf_straight"],
         beside: &["transmission", "rough_specular"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "backdrop",
+        with: &[
+            "fn light_backdrop__backdrop_radiance",
+            "fn cpu_contribution__from_lens_after",
+            "gpu_buffers__backdrop",
+        ],
         ..ADVANCE
     },
     Trace {

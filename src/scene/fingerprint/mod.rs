@@ -20,6 +20,7 @@ impl Scene {
             max_bounces,
             clamp_indirect,
             exposure,
+            backdrop,
             rays_per_pixel: _,
             seed: _,
             estimator: _,
@@ -43,7 +44,7 @@ impl Scene {
             settings: _,
             warnings: _,
         } = self;
-        (max_bounces, (clamp_indirect, exposure)).add_to(&mut hash);
+        (max_bounces, (clamp_indirect, (exposure, backdrop))).add_to(&mut hash);
         (photo, (camera, lens)).add_to(&mut hash);
         (environment, lights).add_to(&mut hash);
         (objects, (shutter, camera_path)).add_to(&mut hash);

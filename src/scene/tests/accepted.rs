@@ -40,6 +40,7 @@ fn the_shortest_scene_has_the_stated_defaults() {
             composite: Composite::Additive,
             backend: BackendChoice::Auto,
             exposure: Exposure::Ev(0.0),
+            backdrop: Backdrop::Photograph(None),
         }
     );
 }
@@ -195,6 +196,7 @@ fn settings_and_flags() {
         composite: Composite::Quotient,
         backend: BackendChoice::Cpu,
         exposure: Exposure::Ev(-1.0),
+        backdrop: Backdrop::Photograph(None),
     };
     assert_eq!(settings, from_file);
     settings.apply(&Overrides::default());
