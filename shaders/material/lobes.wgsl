@@ -1,9 +1,9 @@
 // Twin of src/material/lobes.rs: the same operations in the same order.
 
 import package::material::fresnel::{fresnel_dielectric, refract_about, schlick};
-import package::material::ggx::{ggx_reflect, ggx_refract, ggx_sample_half, GgxEval};
+import package::material::ggx::{DELTA_ALPHA, ggx_reflect, ggx_refract, ggx_sample_half, GgxEval};
 import package::material::interface::{
-    DELTA_ALPHA, Interface, NO_ALBEDO, cos_to, grazing_albedo, interface_at, max3, opaque_fresnel, reflects_delta, surface_index,
+    Interface, NO_ALBEDO, cos_to, grazing_albedo, interface_at, max3, opaque_fresnel, reflects_delta, surface_index,
     thin_walled, transmits_delta,
 };
 import package::material::scatter::{

@@ -9,6 +9,8 @@ import package::packed::records::{
 import package::shared::NONE;
 @if(photo_albedo) import package::camera::lens::camera_project;
 import package::math::{cross3, dot3, safe_sqrt};
+import package::material::facets::{TABLE_SIZE, kept_by_facets};
+import package::material::ggx::{DELTA_ALPHA, transmits_unblurred};
 import package::material::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
 import package::material::texture::{slot, slot_rgb, texture_sample};
 import package::accel::trace::Hit;
@@ -245,6 +247,21 @@ fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
         }
     }
     roughness = clamp(roughness, 0.0, 1.0);
+    let alpha = roughness * roughness;
+    var metal_gain = 0.0;
+    var glass_gain = 1.0;
+    @if(facets) {
+        if entry.facet_table != NONE && alpha >= DELTA_ALPHA {
+            let cos = clamp(dot3(wo, ns), 0.0, 1.0);
+            metal_gain = 1.0 / kept_by_facets(0u, alpha, cos) - 1.0;
+            let is_thin = (flags & MATERIAL_THIN_WALLED) != 0u;
+            if transmission > 0.0 && (is_thin || !transmits_unblurred(alpha, entry.ior)) {
+                var first = entry.facet_table;
+                if !is_thin && !front { first += TABLE_SIZE; }
+                glass_gain = 1.0 / kept_by_facets(first, alpha, cos);
+            }
+        }
+    }
     coat_roughness = clamp(coat_roughness, 0.0, 1.0);
     return Surface(
         position,
@@ -254,7 +271,7 @@ fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
         coat_ns,
         base_color,
         clamp(metallic, 0.0, 1.0),
-        roughness * roughness,
+        alpha,
         entry.ior,
         clamp(specular, 0.0, 1.0),
         max(specular_color, vec3<f32>(0.0)),
@@ -268,5 +285,7 @@ fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
         triangle.material,
         triangle.light,
         triangle.object,
+        metal_gain,
+        glass_gain,
     );
 }

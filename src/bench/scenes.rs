@@ -39,6 +39,7 @@ pub(super) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -
             sampler: SamplerKind::Sobol,
             composite: Composite::Additive,
             backend: BackendChoice::Cpu,
+            multiple_scattering: false,
             exposure: Exposure::Ev(0.0),
             backdrop: Backdrop::Environment,
         },

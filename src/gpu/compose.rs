@@ -76,6 +76,8 @@ features! {
     photons,
     /// Light goes straight through some material.
     panes,
+    /// Facets send light to each other.
+    facets,
     /// Virtual objects show the photograph behind them.
     backdrop,
 }
@@ -125,6 +127,7 @@ impl Features {
             sharing: (scene.pixels.iter()).any(|info| info.flags & packed::PIXEL_SHARES != 0),
             photons: cpu::contribution::photons_traced(&scene.frame),
             panes: scene.frame.flags & packed::FRAME_PANES != 0,
+            facets: !scene.facet_tables.is_empty(),
             backdrop: scene.frame.flags & packed::FRAME_BACKDROP != 0,
         }
     }
@@ -167,6 +170,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &light::environment::SHARED,
     &light::lights::SHARED,
     &light::rectangle::SHARED,
+    &material::facets::SHARED,
     &material::fresnel::SHARED,
     &material::ggx::SHARED,
     &material::interface::SHARED,

@@ -20,9 +20,9 @@
 use glam::Vec3;
 
 use super::fresnel::{fresnel_dielectric, refract_about, schlick};
-use super::ggx::{ggx_reflect, ggx_refract, ggx_sample_half};
+use super::ggx::{DELTA_ALPHA, ggx_reflect, ggx_refract, ggx_sample_half};
 use super::interface::{
-    DELTA_ALPHA, Interface, NO_ALBEDO, cos_to, grazing_albedo, interface_at, max3, opaque_fresnel,
+    Interface, NO_ALBEDO, cos_to, grazing_albedo, interface_at, max3, opaque_fresnel,
     reflects_delta, surface_index, thin_walled, transmits_delta,
 };
 use super::normal::unit;

@@ -12,6 +12,8 @@ use crate::packed::{
 };
 use crate::shared::shared;
 
+use super::facets::{TABLE_SIZE, kept_by_facets};
+use super::ggx::{DELTA_ALPHA, transmits_unblurred};
 use super::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
 use super::texture::{slot, slot_rgb, texture_sample};
 
@@ -69,6 +71,10 @@ shared! {
         pub light: u32,
         /// Scene object, or NONE for quad lights.
         pub object: u32,
+        /// What metal's facets send on by way of others, over what they send at once, for a colour of 1.
+        pub metal_gain: f32,
+        /// What glass sends in all over what its facets send at once.
+        pub glass_gain: f32,
     }
 }
 
@@ -334,6 +340,20 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
         coat_ns = valid_shading_normal(ng, coat_ns, wo);
     }
     roughness = roughness.clamp(0.0, 1.0);
+    let alpha = roughness * roughness;
+    let (mut metal_gain, mut glass_gain) = (0.0, 1.0);
+    if material.facet_table != NONE && alpha >= DELTA_ALPHA {
+        let cos = wo.dot(ns).clamp(0.0, 1.0);
+        metal_gain = 1.0 / kept_by_facets(scene, 0, alpha, cos) - 1.0;
+        let is_thin = flags & MATERIAL_THIN_WALLED != 0;
+        if transmission > 0.0 && (is_thin || !transmits_unblurred(alpha, material.ior)) {
+            let mut first = material.facet_table;
+            if !is_thin && !front {
+                first += TABLE_SIZE;
+            }
+            glass_gain = 1.0 / kept_by_facets(scene, first, alpha, cos);
+        }
+    }
     coat_roughness = coat_roughness.clamp(0.0, 1.0);
     Surface {
         position,
@@ -343,7 +363,7 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
         coat_ns,
         base_color,
         metallic: metallic.clamp(0.0, 1.0),
-        ggx_alpha: roughness * roughness,
+        ggx_alpha: alpha,
         ior: material.ior,
         specular: specular.clamp(0.0, 1.0),
         specular_color: specular_color.max(Vec3::ZERO),
@@ -357,5 +377,7 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
         material: triangle.material,
         light: triangle.light,
         object: triangle.object,
+        metal_gain,
+        glass_gain,
     }
 }

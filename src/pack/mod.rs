@@ -3,6 +3,7 @@
 mod backdrop;
 mod build;
 pub mod camera;
+mod facets;
 mod lights;
 mod panes;
 mod photons;

@@ -43,6 +43,7 @@ pub fn test_scene() -> Scene {
             sampler: SamplerKind::Sobol,
             composite: Composite::Additive,
             backend: BackendChoice::Cpu,
+            multiple_scattering: false,
             exposure: Exposure::Ev(0.0),
             backdrop: Backdrop::Environment,
         },

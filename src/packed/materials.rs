@@ -47,7 +47,8 @@ shared! {
         pub clearcoat_texture: u32,
         pub clearcoat_roughness_texture: u32,
         pub clearcoat_normal_texture: u32,
-        pub pad: u32,
+        /// First float of its glass in `PackedScene::facet_tables`, 0 for metal; NONE: what facets send to each other is lost.
+        pub facet_table: u32,
     }
 }
 
@@ -135,7 +136,7 @@ impl MaterialTable {
             clearcoat_texture: slot(&m.clearcoat_texture, false),
             clearcoat_roughness_texture: slot(&m.clearcoat_roughness_texture, false),
             clearcoat_normal_texture: slot(&m.clearcoat_normal_texture, false),
-            pad: 0,
+            facet_table: NONE,
         }
     }
 
@@ -202,7 +203,7 @@ impl MaterialTable {
             clearcoat_texture: NONE,
             clearcoat_roughness_texture: NONE,
             clearcoat_normal_texture: NONE,
-            pad: 0,
+            facet_table: NONE,
         }
     }
 }

@@ -37,6 +37,10 @@ pub struct PackedScene {
     /// at, then for each scene object its patches, [`records::PHOTO_PATCHES`] pairs: mean albedo of the pixels that see a part of it and how many
     /// they are; their mean position, metres, and mean squared distance from it.
     pub photo_albedo: Vec<[f32; 4]>,
+    /// What rough lobes keep of light: metal, then the glasses (see `material::facets`); empty where none is rough.
+    pub facet_tables: Vec<f32>,
+    /// Indices of the glasses in it, as bits, and where their tables begin.
+    pub(crate) facet_table_of: Vec<(u32, u32)>,
     /// Linear values of the photograph's pixels, three floats each, row-major, where paths may see it (`FRAME_BACKDROP`); else empty.
     pub backdrop: Vec<f32>,
     /// One word a pixel: what the pilot found (see [`PixelInfo`]).
@@ -90,6 +94,8 @@ impl PackedScene {
             env_texels: Vec::new(),
             env_cdf: Vec::new(),
             photo_albedo: Vec::new(),
+            facet_tables: Vec::new(),
+            facet_table_of: Vec::new(),
             backdrop: Vec::new(),
             pixels: Vec::new(),
             swept_spheres: Vec::new(),

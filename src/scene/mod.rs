@@ -331,6 +331,8 @@ pub struct Settings {
     pub sampler: SamplerKind,
     pub composite: Composite,
     pub backend: BackendChoice,
+    /// Facets of rough metal and glass send light to each other, so that none is lost; false: as glTF defines its lobes.
+    pub multiple_scattering: bool,
     pub exposure: Exposure,
     /// Means nothing without a photograph.
     pub backdrop: Backdrop,

@@ -45,6 +45,7 @@ impl Default for Settings {
             backend: BackendChoice::Auto,
             exposure: Exposure::Ev(0.0),
             backdrop: Backdrop::Photograph(None),
+            multiple_scattering: true,
         }
     }
 }
@@ -90,6 +91,7 @@ const KEYS: &[&str] = &[
     "sampler",
     "composite",
     "backend",
+    "multiple_scattering",
 ];
 
 /// `[render]`; exposure and backdrop stand in `[photo]`.
@@ -106,6 +108,9 @@ pub(super) fn read_settings(
     if let Some(table) = root.table("render", "[render]", KEYS)? {
         if let Some(clamp) = table.optional("clamp_indirect", Node::positive_or_infinite)? {
             settings.clamp_indirect = clamp as f32;
+        }
+        if let Some(wanted) = table.optional("multiple_scattering", Node::boolean)? {
+            settings.multiple_scattering = wanted;
         }
         settings.apply(&Overrides {
             rays_per_pixel: table.optional("rays_per_pixel", |node| {

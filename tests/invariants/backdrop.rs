@@ -1,6 +1,6 @@
 //! What virtual objects show of the world that is not modelled: the photograph, where the camera shows it.
 
-use mixray::scene::{Backdrop, BackendChoice, Scene};
+use mixray::scene::{Backdrop, BackendChoice, EnvironmentMap, Scene};
 
 use super::support::*;
 
@@ -112,6 +112,49 @@ material = {{ base_color = [1, 1, 1], transmission = 1.0, roughness = 0.0, ior =
     assert_eq!(dark, [0.0; 3], "control: there is no environment");
 }
 
+/// Rough glass before a constant photograph in a sky of the same radiance is a furnace, however its light is found.
+fn a_constant_backdrop_is_a_furnace(backend: BackendChoice) {
+    for (name, material, tolerance) in [
+        ("frosted", "transmission = 1.0, roughness = 0.5", 0.012),
+        ("matt metal", "metallic = 1.0, roughness = 0.6", 0.012),
+        (
+            "thin",
+            "transmission = 1.0, roughness = 0.4, thin_walled = true",
+            0.012,
+        ),
+    ] {
+        let objects = format!(
+            "[environment]\nradiance = [0.5, 0.5, 0.5]\n[[virtual]]\nshape = \"sphere\"\nsegments = 96\nscale = 0.6\nmaterial = {{ {material} }}\n"
+        );
+        let mut scene = before(&objects, |_, _| [0.5; 3]);
+        scene.settings.max_bounces = 32;
+        scene.settings.rays_per_pixel = 64;
+        scene.settings.backdrop = Backdrop::Photograph(Some(4.0));
+        let inside = |picture: &[[f32; 3]]| {
+            let near = |i: usize| {
+                let (x, y) = (i % WIDTH as usize, i / WIDTH as usize);
+                x.abs_diff(24).pow(2) + y.abs_diff(18).pow(2) < 36
+            };
+            let means: Vec<f64> = (0..picture.len())
+                .filter(|&i| near(i))
+                .map(|i| grey(picture[i]))
+                .collect();
+            mean(&means)
+        };
+        let found = inside(&linear(&scene, backend));
+        assert!((found / 0.5 - 1.0).abs() < tolerance, "{name}: {found}");
+        // Control: what glass shows is the photograph, and what faces the camera mirrors the sky behind it.
+        if name == "matt metal" {
+            let sky = scene.environment.as_mut().expect("has one");
+            sky.map = EnvironmentMap::Constant([1.0; 3]);
+        } else {
+            scene.photo = Some(constant_photo(WIDTH, HEIGHT, 1.0));
+        }
+        let brighter = inside(&linear(&scene, backend));
+        assert!(brighter > found * 1.05, "{name}: {brighter}");
+    }
+}
+
 /// Light that falls on what scatters it never comes from the photograph, and neither does what is seen in the mirror of a real surface.
 fn diffuse_surfaces_are_not_lit_by_the_photograph(backend: BackendChoice) {
     let matt = r#"
@@ -132,5 +175,6 @@ material = { base_color = [0.8, 0.8, 0.8], roughness = 0.6 }
 on_the_cpu!(
     an_invisible_pane_shows_each_pixel_itself,
     a_glass_ball_bends_the_photograph,
+    a_constant_backdrop_is_a_furnace,
     diffuse_surfaces_are_not_lit_by_the_photograph,
 );

@@ -242,6 +242,7 @@ irradiance = [3, 3, 3]
         scene.settings.rays_per_pixel = rays;
         scene.settings.seed = seed;
         scene.settings.max_bounces = 2;
+        scene.settings.multiple_scattering = false;
         let found = picture(&scene, backend);
         found.iter().map(|rgb| rgb[0]).sum::<f64>()
     };

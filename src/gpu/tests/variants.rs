@@ -298,6 +298,14 @@ const TRACES: &[Trace] = &[
         ..ADVANCE
     },
     Trace {
+        feature: "facets",
+        with: &[
+            "fn material_facets__kept_by_facets",
+            "gpu_buffers__facet_tables",
+        ],
+        ..ADVANCE
+    },
+    Trace {
         feature: "rough_specular",
         with: &[
             "fn material_ggx__",

@@ -69,6 +69,7 @@ pub fn plain_material() -> Material {
         specular: 1.0,
         specular_color: [1.0; 3],
         clearcoat_normal_scale: 1.0,
+        facet_table: NONE,
         base_color_texture: NONE,
         metallic_roughness_texture: NONE,
         normal_texture: NONE,

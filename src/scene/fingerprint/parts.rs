@@ -30,7 +30,7 @@ content! {
     TextureRef { texture, uv_set, transform }
     Texture { width, height, rgba8, wrap_u, wrap_v, nearest; name }
 
-    Settings { rays_per_pixel, max_bounces, clamp_indirect, seed, estimator, sampler, composite, backend, exposure, backdrop }
+    Settings { rays_per_pixel, max_bounces, clamp_indirect, seed, estimator, sampler, composite, backend, exposure, backdrop, multiple_scattering }
 
     Intrinsics { size, fx, fy, cx, cy, distortion }
     Entry { key, time_secs, world_from_camera, intrinsics, focus_distance_m; place }
