@@ -98,6 +98,9 @@ pub fn lambert_cos(ng: Vec3, ns: Vec3, wi: Vec3) -> f32 {
 pub fn terminator(ng: Vec3, ns: Vec3, wi: Vec3) -> f32 {
     let of_facet = ng.dot(wi);
     let of_smooth = ns.dot(wi) * ng.dot(ns);
+    if of_facet <= 0.0 || of_smooth <= 0.0 {
+        return 0.0;
+    }
     if of_facet >= of_smooth * NO_FADE {
         return 1.0;
     }

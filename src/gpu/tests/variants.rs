@@ -308,7 +308,7 @@ const TRACES: &[Trace] = &[
     Trace {
         feature: "rough_specular",
         with: &[
-            "fn material_ggx__",
+            "fn material_ggx__ggx_reflect",
             "fn material_lobes__lobes_sample",
             "fn material_lobes__eval_reflection",
             "fn material_normal__valid_shading_normal",
