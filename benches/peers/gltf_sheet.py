@@ -194,6 +194,7 @@ image = "{environment}"
 [[virtual]]
 mesh = "{model}"
 [render]
+multiple_scattering = false
 rays_per_pixel = {samples}
 max_bounces = {BOUNCES + 1}
 """

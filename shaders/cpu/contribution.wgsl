@@ -2,11 +2,11 @@
 
 import package::gpu::buffers::{frame, pixels};
 import package::camera::sampler::{SampleKey, SampleSet, sample_set};
-import package::packed::records::{FRAME_NO_PHOTONS, SIDE_VIRTUAL};
-import package::material::bsdf::bsdf_is_polished;
+import package::packed::records::{FRAME_BACKDROP, FRAME_NO_PHOTONS, SIDE_VIRTUAL};
+import package::material::bsdf::{bsdf_is_diffuse, bsdf_is_polished};
 import package::material::surface::Surface;
 import package::cpu::state::{
-    DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_REAL_CHAIN, EVENT_SCATTERED, EVENT_SEEN, EVENT_VIRTUAL_CHAIN, MODE_MIXED, MODE_REAL, MODE_SHARED, PathState, path_radiances_real, path_results,
+    DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_FROM_LENS, EVENT_REAL_CHAIN, EVENT_SCATTERED, EVENT_SEEN, EVENT_VIRTUAL_CHAIN, MODE_MIXED, MODE_REAL, MODE_SHARED, PathState, path_radiances_real, path_results,
 };
 
 fn draw(st: ptr<function, PathState>, purpose: u32) -> SampleSet {
@@ -55,6 +55,18 @@ fn vertex_left_to_photons(st: ptr<function, PathState>, s: Surface) -> bool {
         && (*st).ray.side == SIDE_VIRTUAL
         && ((*st).path.events & (EVENT_SEEN | EVENT_REAL_CHAIN)) == EVENT_SEEN
         && bsdf_is_polished(s);
+}
+
+fn sees_backdrop(st: ptr<function, PathState>) -> bool {
+    return (frame.flags & FRAME_BACKDROP) != 0u
+        && (*st).path.mode == MODE_MIXED
+        && ((*st).path.events & EVENT_FROM_LENS) != 0u;
+}
+
+fn from_lens_after(st: ptr<function, PathState>, s: Surface, delta: bool, smooth_: bool) -> u32 {
+    let looks_through = (*st).ray.side == SIDE_VIRTUAL && (delta || !bsdf_is_diffuse(s));
+    let left_to_photons_ = smooth_ && ((*st).path.events & EVENT_SEEN) != 0u;
+    return select(0u, (*st).path.events & EVENT_FROM_LENS, looks_through && !left_to_photons_);
 }
 
 fn photons_traced() -> bool {

@@ -4,8 +4,9 @@ import package::gpu::buffers::{frame, pixels};
 import package::packed::records::{FRAME_AOVS, FRAME_ENV_DRAWN, FRAME_SHUTTER, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_SHARES};
 import package::shared::NONE;
 import package::material::bsdf::bsdf_albedo;
+import package::light::backdrop::{backdrop_of_pixel, backdrop_radiance};
 import package::light::cones::{cone_pdf, cones_at};
-import package::cpu::contribution::{accumulate, density_weight, events_after, left_to_photons, sample_key};
+import package::cpu::contribution::{accumulate, density_weight, events_after, left_to_photons, sample_key, sees_backdrop};
 import package::light::environment::{env_radiance, share_left_to_eye};
 import package::camera::lens::camera_ray_from;
 import package::light::lights::env_arriving;
@@ -13,15 +14,16 @@ import package::math::{dot3, hash_combine, hash_u32};
 import package::camera::sampler::sample_4d;
 import package::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
 import package::cpu::state::{
-    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_SCATTERED, FAR, FirstHit, Hits, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE,
-    PENDING_NEXT, PENDING_REAL, PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED,
+    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_FROM_LENS, EVENT_FROM_SHARED, EVENT_PASSED, EVENT_SCATTERED, FAR, FirstHit, Hits, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE,
+    PENDING_BEHIND_PANE, PENDING_NEXT, PENDING_REAL, PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED,
     REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_VIRTUAL, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
     REQUEST_VIRTUAL_THEN_REAL, RealPath, STAGE_DIFFERENCE_BSDF, STAGE_DIFFERENCE_CONE, STAGE_DIFFERENCE_SHADOW, STAGE_DONE,
     STAGE_PAPER_BEHIND, STAGE_PATH, STAGE_PATH_SHADOW, STAGE_PRIMARY_REAL, STAGE_PRIMARY_VIRTUAL, STAGE_REAL_PASS, Segment,
-    path_differences, path_first_hits, path_nexts, path_radiances_real, path_reals, path_results, path_state,
+    path_differences, path_first_hits, path_nexts, path_passed_m, path_radiances_real, path_reals, path_results, path_state,
 };
 import package::material::surface::{Surface, surface_at};
 import package::accel::trace::Hit;
+import package::cpu::panes::{is_pane, open_share, open_share_real};
 import package::cpu::points::{end_capture, end_cone_capture};
 import package::cpu::sharing::tile_of;
 import package::cpu::vertex::shade_vertex;
@@ -142,6 +144,7 @@ fn primary_real(st: ptr<function, PathState>) {
     if virtual_is_nearer((*st).hits) {
         path_results[(*st).lane].mask = 1u;
         (*st).path.mode = MODE_MIXED;
+        @if(backdrop) { (*st).path.events |= EVENT_FROM_LENS; }
         plan_vertex(st, (*st).hits.in_virtual);
     } else if (*st).hits.in_real.triangle != NONE {
         (*st).path.mode = MODE_DIFFERENCE;
@@ -197,11 +200,19 @@ fn resume(st: ptr<function, PathState>) {
             return;
         }
         if ((*st).path.pending & PENDING_REAL) != 0u {
-            (*st).path.pending &= ~PENDING_REAL;
+            let behind_pane = ((*st).path.pending & PENDING_BEHIND_PANE) != 0u;
+            (*st).path.pending &= ~(PENDING_REAL | PENDING_BEHIND_PANE);
             end_cone_capture(st);
             let real = path_reals[lane];
             (*st).path.mode = MODE_REAL;
             follow(st, real.segment);
+            @if(panes) {
+                (*st).path.events = ((*st).path.events & ~EVENT_PASSED) | EVENT_FROM_SHARED;
+                if behind_pane {
+                    (*st).path.events |= EVENT_PASSED;
+                    path_passed_m[lane] = 0.0;
+                }
+            }
             (*st).ray.depth = (*st).path.real_depth;
             plan_vertex(st, real.hit);
             continue;
@@ -271,11 +282,16 @@ fn paper_behind(st: ptr<function, PathState>) {
         path_escape(st);
     }
     (*st).path.mode = MODE_MIXED;
+    @if(panes) { (*st).path.events |= EVENT_FROM_SHARED; }
+    @if(backdrop) {
+        if (*st).ray.depth == 1u { (*st).path.events |= EVENT_FROM_LENS; }
+    }
     plan_vertex(st, (*st).hits.in_virtual);
 }
 
 fn path_escape(st: ptr<function, PathState>) {
-    if (*st).ray.depth == 1u && (frame.flags & FRAME_ENV_DRAWN) == 0u { return; }
+    let seen_past_panes = ((*st).path.events & EVENT_PASSED) != 0u;
+    if (*st).ray.depth == 1u && (frame.flags & FRAME_ENV_DRAWN) == 0u && !seen_past_panes { return; }
     var light = escaping_light(st);
     @if(photons) {
         if left_to_photons(st) { light *= share_left_to_eye((*st).ray.direction); }
@@ -284,34 +300,50 @@ fn path_escape(st: ptr<function, PathState>) {
 }
 
 fn escaping_light(st: ptr<function, PathState>) -> vec3<f32> {
+    @if(backdrop) {
+        if sees_backdrop(st) {
+            var weight = 1.0;
+            if (*st).path.density != DELTA_DENSITY {
+                weight = density_weight((*st).path.density, env_arriving((*st).ray.direction).pdf);
+            }
+            return (*st).path.throughput * backdrop_behind(st) * weight;
+        }
+    }
     if (*st).path.density == DELTA_DENSITY { return (*st).path.throughput * env_radiance((*st).ray.direction); }
     let arriving = env_arriving((*st).ray.direction);
     return (*st).path.throughput * arriving.radiance * density_weight((*st).path.density, arriving.pdf);
 }
 
+fn backdrop_behind(st: ptr<function, PathState>) -> vec3<f32> {
+    if (*st).ray.depth == 1u { return backdrop_of_pixel((*st).path.pixel); }
+    return backdrop_radiance((*st).ray.origin.position, (*st).ray.direction);
+}
+
 fn path_shadow(st: ptr<function, PathState>) {
-    let open_virtual = (*st).hits.in_virtual.triangle == NONE;
-    let open_real = (*st).hits.in_real.triangle == NONE;
+    let open_real = open_share_real(st);
+    let open_mixed = open_share((*st).hits.in_virtual) * open_real;
     let light = (*st).path.shadow_contribution;
     @if(paper) {
         if (*st).path.mode == MODE_SHARED {
-            if (*st).ray.request == REQUEST_SHADOW_PAIR {
-                if open_virtual { path_results[(*st).lane].radiance += light; }
-                if open_real { path_radiances_real[(*st).lane] += light; }
-            } else if open_virtual && open_real {
-                path_results[(*st).lane].radiance += light;
+            if any(open_mixed != vec3<f32>(0.0)) { path_results[(*st).lane].radiance += light * open_mixed; }
+            if (*st).ray.request == REQUEST_SHADOW_PAIR && any(open_real != vec3<f32>(0.0)) {
+                path_radiances_real[(*st).lane] += light * open_real;
             }
             return;
         }
     }
-    if open_virtual && open_real { accumulate(st, light); }
+    if any(open_mixed != vec3<f32>(0.0)) { accumulate(st, light * open_mixed); }
 }
 
 fn difference_shadow(st: ptr<function, PathState>) {
-    let open_real = (*st).hits.in_real.triangle == NONE;
-    let open_virtual = (*st).hits.in_virtual.triangle == NONE;
-    let blocked_alone = (*st).ray.request == REQUEST_SHADOW_DIFFERENCE;
-    if open_real && open_virtual != blocked_alone { path_results[(*st).lane].radiance += (*st).path.shadow_contribution; }
+    let open_virtual = open_share((*st).hits.in_virtual);
+    var share = open_share_real(st);
+    if (*st).ray.request == REQUEST_SHADOW_DIFFERENCE {
+        share *= vec3<f32>(1.0) - open_virtual;
+    } else {
+        share *= open_virtual;
+    }
+    if any(share != vec3<f32>(0.0)) { path_results[(*st).lane].radiance += (*st).path.shadow_contribution * share; }
 }
 
 fn difference_cone(st: ptr<function, PathState>) {
@@ -350,12 +382,16 @@ fn split_difference(st: ptr<function, PathState>) {
         path_results[(*st).lane].radiance -= escaping_light(st);
     } else {
         (*st).path.pending |= PENDING_REAL;
+        @if(panes) {
+            if is_pane((*st).hits.in_virtual, (*st).ray.direction) { (*st).path.pending |= PENDING_BEHIND_PANE; }
+        }
         var segment = followed(st);
         segment.throughput = -segment.throughput;
         path_reals[(*st).lane] = RealPath(segment, (*st).hits.in_real);
         (*st).path.real_depth = (*st).ray.depth + 1u;
     }
     (*st).path.mode = MODE_MIXED;
+    @if(panes) { (*st).path.events |= EVENT_FROM_SHARED; }
     (*st).ray.depth += 1u;
     plan_vertex(st, (*st).hits.in_virtual);
 }

@@ -1,20 +1,21 @@
 // What a sample leaves for the other samples of its sharing tile. Rust twin: src/cpu/points.rs.
 
 import package::gpu::buffers::pixels;
-import package::packed::records::PIXEL_SHARES;
+import package::packed::records::{MATERIAL_NORMAL_MAPPED, PIXEL_SHARES};
 import package::material::bsdf::bsdf_is_lambertian;
 import package::material::surface::Surface;
 import package::cpu::state::{
-    FIRST_DIFFERENCE, FIRST_NONE, FIRST_VIRTUAL, FirstVertex, MODE_DIFFERENCE, MODE_MIXED, POINT_COVERED, POINT_COVERING, POINT_NONE, POINT_RECURSION, PathState,
+    EVENT_PASSED, FIRST_DIFFERENCE, FIRST_NONE, FIRST_VIRTUAL, FirstVertex, MODE_DIFFERENCE, MODE_MIXED, POINT_COVERED, POINT_COVERING, POINT_NONE, POINT_RECURSION, PathState,
     SharedPoint, path_firsts, path_points, path_results,
 };
 
 fn shares(st: ptr<function, PathState>) -> bool {
-    return (pixels[(*st).path.pixel].flags & PIXEL_SHARES) != 0u;
+    return (pixels[(*st).path.pixel].flags & PIXEL_SHARES) != 0u && ((*st).path.events & EVENT_PASSED) == 0u;
 }
 
 fn keep_first_vertex(st: ptr<function, PathState>, s: Surface, cone_probability: f32, bsdf_probability: f32) {
-    if (*st).ray.depth != 1u || !shares(st) || !bsdf_is_lambertian(s) { return; }
+    let is_plain = bsdf_is_lambertian(s) && (s.flags & MATERIAL_NORMAL_MAPPED) == 0u;
+    if (*st).ray.depth != 1u || !shares(st) || !is_plain { return; }
     var kept = FIRST_NONE;
     if (*st).path.mode == MODE_DIFFERENCE { kept = FIRST_DIFFERENCE; }
     if (*st).path.mode == MODE_MIXED { kept = FIRST_VIRTUAL; }

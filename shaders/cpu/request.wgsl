@@ -1,7 +1,8 @@
 // Answers a sample's ray request. Rust twin: src/cpu/request.rs.
 
 import package::gpu::buffers::{frame, materials, triangles};
-import package::packed::records::{FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, SIDE_REAL, SIDE_VIRTUAL};
+import package::cpu::panes::{blocks, pass_, passage, shadow_answer};
+import package::packed::records::{FRAME_BOTH_SHADOWS, FRAME_PANES, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, SIDE_REAL, SIDE_VIRTUAL};
 import package::shared::NONE;
 import package::math::{dot3, hash_combine, length3, uniform_from_bits};
 import package::cpu::state::{
@@ -46,7 +47,7 @@ fn next_query(request: u32, step: u32, t_max: f32, hits: Hits) -> Query {
         }
         case REQUEST_SHADOW_MIXED: {
             if step == 0u { return query(SIDE_VIRTUAL, true, t_max, false); }
-            if step == 1u && !met_virtual { return query(SIDE_REAL, true, t_max, true); }
+            if step == 1u && !blocks(hits.in_virtual) { return query(SIDE_REAL, true, t_max, true); }
         }
         case REQUEST_SHADOW_REAL: {
             if step == 0u { return query(SIDE_REAL, true, t_max, true); }
@@ -58,7 +59,7 @@ fn next_query(request: u32, step: u32, t_max: f32, hits: Hits) -> Query {
         case REQUEST_SHADOW_PAIR: {
             if step == 0u { return query(SIDE_REAL, true, t_max, false); }
             if step == 1u { return query(SIDE_VIRTUAL, true, t_max, false); }
-            if step == 2u && !met_virtual { return Query(SIDE_REAL, true, t_max, false, true); }
+            if step == 2u && !blocks(hits.in_virtual) { return Query(SIDE_REAL, true, t_max, false, true); }
         }
         default: {}
     }
@@ -105,26 +106,40 @@ fn answer(st: ptr<function, PathState>, thread: u32) {
     var layer = 0u;
     var t_min = -1.0;
     var skip = NONE;
-    // Transparent layers repeat a query from where it stopped.
+    @if(panes) let panes = (frame.flags & FRAME_PANES) != 0u && is_shadow(request);
+    @if(panes) var passed = passage();
+    // Transparent layers and panes repeat a query from where it stopped.
     loop {
         let q = next_query(request, step, (*st).ray.t_max, hits);
         if q.world == QUERY_NONE { break; }
         var ray = ray_into((*st).ray, q.world, q.t_max);
         var any_hit = q.any_hit;
-        @if(alpha) {
-            any_hit = false;
+        @if(alpha) { any_hit = false; }
+        @if(panes) { any_hit = any_hit && !panes; }
+        @if(alpha || panes) {
             if layer > 0u {
                 ray.t_min = t_min;
                 ray.skip = skip;
             }
         }
         var hit = trace(ray, q.world, any_hit, thread);
-        @if(alpha) {
-            if hit.triangle != NONE && layer + 1u < MAX_ALPHA_LAYERS && !meets((*st).ray, hit) {
-                t_min = hit.t;
-                skip = hit.triangle;
-                layer += 1u;
-                continue;
+        @if(alpha || panes) {
+            if hit.triangle != NONE && layer + 1u < MAX_LAYERS {
+                var goes_on = false;
+                @if(alpha) { goes_on = !meets((*st).ray, hit); }
+                @if(panes) {
+                    if panes && !goes_on {
+                        let further = pass_(passed, hit, ray.direction);
+                        goes_on = any(further.share != vec3<f32>(0.0));
+                        if goes_on { passed = further; }
+                    }
+                }
+                if goes_on {
+                    t_min = hit.t;
+                    skip = hit.triangle;
+                    layer += 1u;
+                    continue;
+                }
             }
             layer = 0u;
         }
@@ -132,7 +147,13 @@ fn answer(st: ptr<function, PathState>, thread: u32) {
             // Only that something was met means anything.
             hit.t = 0.0;
         }
-        if q.to_real { hits.in_real = hit; } else { hits.in_virtual = hit; }
+        @if(panes) {
+            if panes {
+                hit = shadow_answer(passed, hit, ray.t_max);
+                passed = passage();
+            }
+        }
+        if q.to_real { hits.in_real = hit; } else if q.world == SIDE_VIRTUAL || blocks(hit) { hits.in_virtual = hit; }
         if q.is_last { break; }
         step += 1u;
     }

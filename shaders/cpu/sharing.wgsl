@@ -7,8 +7,9 @@ import package::packed::records::{SIDE_REAL, SIDE_VIRTUAL};
 import package::work::list::TILE_PLACES;
 import package::film::sums::is_unusable;
 import package::light::cones::{cone_pdf, cones_at};
-import package::material::scatter::lambert_cos;
+import package::material::scatter::{lambert_cos, terminator};
 import package::math::{INV_PI, dot3, length3, safe_sqrt};
+import package::cpu::panes::blocks;
 import package::cpu::request::answer;
 import package::cpu::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS};
 import package::cpu::state::{
@@ -46,7 +47,7 @@ fn link_to(first: FirstVertex, point: SharedPoint, kind: u32) -> Link {
     if kind != POINT_RECURSION {
         drawn = first.cone_probability * cone_pdf(cones_at(first.origin.position, first.ns), direction);
     }
-    return Link(cosine * solid_angle, drawn * solid_angle);
+    return Link(cosine * terminator(first.ng, first.ns, direction) * solid_angle, drawn * solid_angle);
 }
 
 fn sees(st: ptr<function, PathState>, first: FirstVertex, point: SharedPoint, kind: u32, thread: u32) -> bool {
@@ -64,9 +65,13 @@ fn sees(st: ptr<function, PathState>, first: FirstVertex, point: SharedPoint, ki
         0u,
     );
     answer(st, thread);
-    let open_virtual = (*st).hits.in_virtual.triangle == NONE;
-    let open_real = (*st).hits.in_real.triangle == NONE;
-    return open_real && open_virtual != covered;
+    let in_real = (*st).hits.in_real;
+    let in_virtual = (*st).hits.in_virtual;
+    if covered {
+        let by_no_pane = blocks(in_virtual) && in_virtual.t == 0.0;
+        return in_real.triangle == NONE && by_no_pane;
+    }
+    return in_real.triangle == NONE && in_virtual.triangle == NONE;
 }
 
 fn first_link(kind: u32) -> u32 {

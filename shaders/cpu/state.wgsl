@@ -19,6 +19,7 @@ import package::work::rays::SampleRays;
 @group(2) @binding(9) var<storage, read_write> path_firsts: array<FirstVertex>;
 @group(2) @binding(10) var<storage, read_write> path_points: array<array<SharedPoint, POINTS>>;
 @group(2) @binding(11) var<storage, read_write> path_links: array<array<f32, LINKS>>;
+@group(2) @binding(12) var<storage, read_write> path_passed_m: array<f32>;
 
 // What a step works on. It reads and writes the parts that are not here where they lie, at `lane`.
 struct PathState {

@@ -2,25 +2,30 @@
 
 import package::gpu::buffers::{frame, lights, materials};
 import package::packed::records::{
-    FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, LIGHT_ENVIRONMENT, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED,
+    FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, FRAME_PANES, LIGHT_ENVIRONMENT, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED,
     MATERIAL_UNLIT, SIDE_REAL, SIDE_VIRTUAL,
 };
 import package::shared::NONE;
 import package::material::scatter::BsdfSample;
-import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample};
+import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample, bsdf_straight};
 import package::camera::sampler::{SampleSet, fourth, pair, second_pair, third};
+import package::light::backdrop::backdrop_radiance;
 import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres};
-import package::cpu::contribution::{accumulate, density_weight, draw, events_after, left_to_photons, vertex_left_to_photons};
+import package::cpu::contribution::{
+    accumulate, density_weight, draw, events_after, from_lens_after, left_to_photons, sees_backdrop, vertex_left_to_photons,
+};
 import package::light::environment::share_left_to_eye;
 import package::light::guide::{GUIDE_SHARE, guide_cell, guide_count, guide_pdf, guide_sample};
+import package::cpu::panes::{distance_from_vertex, draw_at_pane, is_shared, may_leave_no_vertex, pass_straight, transmittance};
 import package::cpu::points::{keep_first_vertex, offer_point};
 import package::cpu::contribution::{
     SET_DIFFERENCE_BSDF, SET_DIFFERENCE_CONE, SET_DIFFERENCE_LIGHT, SET_PATH_BSDF, SET_PATH_LIGHT,
 };
 import package::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
-import package::math::{dot3, exp_, safe_sqrt};
+import package::math::{dot3, safe_sqrt};
 import package::cpu::state::{
-    COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_GUIDED, EVENT_SCATTERED, MODE_MIXED, DifferenceRay, FAR, MODE_DIFFERENCE, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
+    COINCIDENCE, DELTA_DENSITY, DifferenceRay, EVENT_AT_POLISHED, EVENT_FROM_LENS, EVENT_FROM_SHARED, EVENT_GUIDED, EVENT_LIGHT_LEFT_TO_PATH,
+    EVENT_PASSED, EVENT_SCATTERED, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
     PENDING_SHADOW, PathState, REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED,
     REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL, RayOrigin, Segment, path_differences, path_nexts,
 };
@@ -46,12 +51,6 @@ fn is_difference(st: ptr<function, PathState>) -> bool {
     }
 }
 
-fn transmittance(medium: u32, distance: f32) -> vec3<f32> {
-    if medium == NONE { return vec3<f32>(1.0); }
-    let sigma = materials[medium].sigma_a;
-    return vec3<f32>(exp_(-sigma.x * distance), exp_(-sigma.y * distance), exp_(-sigma.z * distance));
-}
-
 fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     let difference = is_difference(st);
     let wo = -(*st).ray.direction;
@@ -60,12 +59,23 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
         (*st).path.throughput *= transmittance((*st).path.medium, distance);
     }
     if !difference {
-        add_emission(st, s, distance);
+        add_emission(st, s);
     }
-    if (*st).ray.depth > frame.max_bounces || (s.flags & EMITS_ONLY) != 0u || all((*st).path.throughput == vec3<f32>(0.0)) {
+    let past_last = (*st).ray.depth > frame.max_bounces;
+    if (past_last && (frame.flags & FRAME_PANES) == 0u) || (s.flags & EMITS_ONLY) != 0u || all((*st).path.throughput == vec3<f32>(0.0)) {
         return;
     }
     stand_at(st, s, distance);
+    @if(panes) {
+        if past_last {
+            if may_leave_no_vertex(st, s, wo) {
+                let direction = (*st).ray.direction;
+                let throughput = (*st).path.throughput * bsdf_straight(s, wo);
+                pass_straight(st, direction, throughput, medium_along(st, s, direction));
+            }
+            return;
+        }
+    }
     @if(sharing) { offer_point(st, s); }
 
     @if(photons) {
@@ -136,7 +146,7 @@ fn coincides(st: ptr<function, PathState>, s: Surface, distance: f32) -> bool {
     return abs(dot3((*st).ray.direction, offset)) * distance <= errors;
 }
 
-fn add_emission(st: ptr<function, PathState>, s: Surface, distance: f32) {
+fn add_emission(st: ptr<function, PathState>, s: Surface) {
     if max_element(s.emission) <= 0.0 { return; }
     var weight = 1.0;
     @if(area_lights) {
@@ -145,6 +155,7 @@ fn add_emission(st: ptr<function, PathState>, s: Surface, distance: f32) {
         }
         if s.light != NONE && (*st).path.density != DELTA_DENSITY {
             let direction = (*st).ray.direction;
+            let distance = distance_from_vertex(st);
             let from_position = s.position - direction * distance;
             let pdf = light_pdf_hit(s.light, from_position, direction, distance);
             weight = density_weight((*st).path.density, pdf);
@@ -163,7 +174,12 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, technique
         let choice_coin = second_pair(u);
         index = light_select(choice_coin.x, choice_coin.y);
     }
-    let l = light_sample(index, s.position, pair(u));
+    var l = light_sample(index, s.position, pair(u));
+    @if(backdrop) {
+        if lights[index].kind == LIGHT_ENVIRONMENT && sees_backdrop(st) && from_lens_after(st, s, false, bsdf_is_polished(s)) != 0u {
+            l.radiance = backdrop_radiance(s.position, l.direction);
+        }
+    }
     var contribution = light_contribution(st, s, wo, techniques, l);
     @if(photons) {
         if vertex_left_to_photons(st, s) { contribution *= light_left_to_eye(index, l.direction); }
@@ -222,6 +238,10 @@ fn plan_shadow(st: ptr<function, PathState>, s: Surface, l: LightSample, contrib
         if (*st).path.mode == MODE_SHARED && real_light { request = REQUEST_SHADOW_PAIR; }
     }
     (*st).ray.request = request;
+    @if(panes) {
+        (*st).path.events &= ~EVENT_LIGHT_LEFT_TO_PATH;
+        if is_shared(st) && !l.delta { (*st).path.events |= EVENT_LIGHT_LEFT_TO_PATH; }
+    }
     (*st).path.pending |= PENDING_SHADOW;
 }
 
@@ -300,7 +320,11 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
     let difference = is_difference(st);
     let leaves_to_cones = left_to_cones(s);
     if difference && leaves_to_cones && (*st).ray.depth >= frame.max_bounces { return; }
-    let u = draw(st, select(SET_PATH_BSDF, SET_DIFFERENCE_BSDF, difference));
+    var u = draw(st, select(SET_PATH_BSDF, SET_DIFFERENCE_BSDF, difference));
+    @if(panes) let at_pane = may_leave_no_vertex(st, s, wo);
+    @if(panes) {
+        if at_pane { u = draw_at_pane(st); }
+    }
     if !plays(u, techniques.bsdf_probability) { return; }
     var lobe = 0.0;
     if !bsdf_is_lambertian(s) { lobe = third(u); }
@@ -309,20 +333,29 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
     @if(guide) { share = guided_share(st, s); }
     let b = path_sample(st, s, wo, v, share);
     if !b.valid { return; }
+    let throughput = (*st).path.throughput * b.weight;
+    let medium = medium_along(st, s, b.wi);
+    let straight = b.delta && b.transmitted && bsdf_passes_straight(s);
+    @if(panes) {
+        if at_pane && straight {
+            pass_straight(st, b.wi, throughput, medium);
+            return;
+        }
+    }
     var events = (*st).path.events;
-    @if(photons) {
-        if !(b.delta && b.transmitted && bsdf_passes_straight(s)) {
-            let smooth_ = b.delta || bsdf_is_polished(s);
+    @if(backdrop) let from_lens = from_lens_after(st, s, b.delta, b.delta || bsdf_is_polished(s));
+    @if(photons || backdrop) {
+        let smooth_ = b.delta || bsdf_is_polished(s);
+        if !straight {
             events = events_after(events, (*st).ray.depth, (*st).ray.side, smooth_);
         }
+    }
+    @if(guide) {
         if share > 0.0 { events |= EVENT_GUIDED; }
     }
-    var segment = Segment(
-        b.wi,
-        select(b.pdf, DELTA_DENSITY, b.delta),
-        (*st).path.throughput * b.weight,
-        medium_along(st, s, b.wi),
-    );
+    @if(panes) { events &= ~(EVENT_PASSED | EVENT_FROM_SHARED); }
+    @if(backdrop) { events = (events & ~EVENT_FROM_LENS) | from_lens; }
+    var segment = Segment(b.wi, select(b.pdf, DELTA_DENSITY, b.delta), throughput, medium);
     @if(!paper) {
         if difference {
             segment.throughput *= 1.0 / techniques.bsdf_probability;
@@ -348,6 +381,7 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
         }
     }
     (*st).path.pending |= PENDING_NEXT;
+    @if(panes) { events |= (*st).path.events & EVENT_LIGHT_LEFT_TO_PATH; }
     (*st).path.events = events;
     path_nexts[(*st).lane] = segment;
 }

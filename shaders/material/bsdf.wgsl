@@ -2,8 +2,8 @@
 
 import package::packed::records::{MATERIAL_LAMBERTIAN, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT};
 import package::material::interface::{max3, surface_index, thin_walled};
-import package::material::lobes::{lobes_albedo, lobes_are_delta, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample};
-import package::material::scatter::{BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, lambert_cos, sample_lambert};
+import package::material::lobes::{lobes_albedo, lobes_are_delta, lobes_are_diffuse, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample, lobes_straight};
+import package::material::scatter::{BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, kept_at_terminator, lambert_cos, sample_lambert};
 import package::math::INV_PI;
 import package::material::surface::Surface;
 
@@ -21,7 +21,7 @@ fn bsdf_eval(s: Surface, wo: vec3<f32>, wi: vec3<f32>) -> BsdfEval {
         }
     }
     let pdf = lambert_cos(s.ng, s.ns, wi) * INV_PI;
-    return BsdfEval(s.base_color * pdf, pdf);
+    return BsdfEval(s.base_color * (pdf * kept_at_terminator(s, wi)), pdf);
 }
 
 fn bsdf_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
@@ -38,7 +38,7 @@ fn bsdf_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
     if pdf <= 0.0 {
         return SAMPLE_NOTHING;
     }
-    return BsdfSample(wi, s.base_color, pdf, false, false, true);
+    return BsdfSample(wi, s.base_color * kept_at_terminator(s, wi), pdf, false, false, true);
 }
 
 fn bsdf_is_delta(s: Surface) -> bool {
@@ -51,12 +51,23 @@ fn bsdf_is_delta(s: Surface) -> bool {
     return lobes_are_delta(s);
 }
 
+fn bsdf_is_diffuse(s: Surface) -> bool {
+    return bsdf_is_lambertian(s) || lobes_are_diffuse(s);
+}
+
 fn bsdf_is_polished(s: Surface) -> bool {
     return !scatters_nothing(s) && !bsdf_is_lambertian(s) && lobes_are_polished(s);
 }
 
 fn bsdf_passes_straight(s: Surface) -> bool {
     return thin_walled(s) || surface_index(s).eta2_minus_1 == 0.0;
+}
+
+fn bsdf_straight(s: Surface, wo: vec3<f32>) -> vec3<f32> {
+    if scatters_nothing(s) || bsdf_is_lambertian(s) || !bsdf_passes_straight(s) {
+        return vec3<f32>(0.0);
+    }
+    return lobes_straight(s, wo);
 }
 
 fn bsdf_index_ratio(s: Surface) -> f32 {

@@ -3,6 +3,10 @@
 import package::math::{INV_PI, dot3, orthonormal_basis, sincos_2pi};
 import package::material::normal::unit;
 
+fn transmits_unblurred(alpha: f32, ior: f32) -> bool {
+    return alpha < DELTA_ALPHA || alpha * abs(ior - 1.0) < DELTA_BEND;
+}
+
 fn smith_l(alpha: f32, c: f32) -> f32 {
     let a2 = alpha * alpha;
     return c + sqrt(a2 + (1.0 - a2) * c * c);

@@ -2,7 +2,7 @@
 
 import package::packed::records::MATERIAL_THIN_WALLED;
 import package::material::fresnel::{fresnel_dielectric, normal_reflectance, relative_index, schlick, RelativeIndex};
-import package::material::ggx::MIN_COS;
+import package::material::ggx::{DELTA_ALPHA, MIN_COS, transmits_unblurred};
 import package::math::dot3;
 import package::material::surface::Surface;
 
@@ -16,10 +16,6 @@ fn thin_walled(s: Surface) -> bool {
 
 fn surface_index(s: Surface) -> RelativeIndex {
     return relative_index(s.ior, s.front || thin_walled(s));
-}
-
-fn transmits_unblurred(alpha: f32, ior: f32) -> bool {
-    return alpha < DELTA_ALPHA || alpha * abs(ior - 1.0) < DELTA_BEND;
 }
 
 fn reflects_delta(s: Surface) -> bool {
@@ -59,12 +55,13 @@ fn transmitting_fresnel(s: Surface, cos: f32) -> vec3<f32> {
 
 fn interface_at(s: Surface, cos: f32) -> Interface {
     let dielectric = 1.0 - s.metallic;
-    var reflected = schlick(s.base_color, cos) * s.metallic
+    let metal = schlick(s.base_color, cos) * (vec3<f32>(1.0) + s.base_color * s.metal_gain);
+    var reflected = metal * s.metallic
         + opaque_fresnel(s, cos) * (dielectric * (1.0 - s.transmission));
     var transmitted = vec3<f32>(0.0);
     @if(transmission) {
         if s.transmission > 0.0 {
-            let share = dielectric * s.transmission;
+            let share = dielectric * s.transmission * s.glass_gain;
             let f = transmitting_fresnel(s, cos);
             reflected += f * share;
             transmitted = s.base_color * (share * (1.0 - max3(f)));

@@ -1,13 +1,14 @@
 // Twin of src/material/lobes.rs: the same operations in the same order.
 
 import package::material::fresnel::{fresnel_dielectric, refract_about, schlick};
-import package::material::ggx::{ggx_reflect, ggx_refract, ggx_sample_half, GgxEval};
+import package::material::ggx::{DELTA_ALPHA, ggx_reflect, ggx_refract, ggx_sample_half, GgxEval};
 import package::material::interface::{
-    DELTA_ALPHA, Interface, NO_ALBEDO, cos_to, grazing_albedo, interface_at, max3, opaque_fresnel, reflects_delta, surface_index,
+    Interface, NO_ALBEDO, cos_to, grazing_albedo, interface_at, max3, opaque_fresnel, reflects_delta, surface_index,
     thin_walled, transmits_delta,
 };
 import package::material::scatter::{
-    BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, delta_sample, lambert_cos, mirrored_at, on_side, reflected_about, sample_lambert,
+    BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, delta_sample, kept_at_terminator, lambert_cos, mirrored_at, on_side, reflected_about,
+    sample_lambert,
 };
 import package::math::{INV_PI, dot3};
 import package::material::normal::unit;
@@ -89,7 +90,8 @@ fn eval_reflection(s: Surface, lobes: Lobes, wo: vec3<f32>, wi: vec3<f32>) -> Bs
         let cos_half = 0.5 * sqrt(dot3(sum, sum));
         let cosine = lambert_cos(s.ng, s.ns, wi) * INV_PI;
         let passed = 1.0 - max3(opaque_fresnel(s, cos_half));
-        f_cos += diffuse_color(s) * (under * passed * cosine);
+        let kept = kept_at_terminator(s, wi);
+        f_cos += diffuse_color(s) * (under * passed * cosine * kept);
         pdf += lobes.p_diffuse * cosine;
     }
     if lobes.p_interface > 0.0 && !reflects_delta(s) {
@@ -137,7 +139,9 @@ fn lobes_sample(s: Surface, wo: vec3<f32>, u: vec3<f32>) -> BsdfSample {
         return SAMPLE_NOTHING;
     }
     if u.x < lobes.p_diffuse {
-        return mixture_sample(s, lobes, wo, sample_lambert(s, u.y, u.z));
+        let wi = sample_lambert(s, u.y, u.z);
+        if dot3(s.ng, wi) > 0.0 { return mixture_sample(s, lobes, wo, wi); }
+        return SAMPLE_NOTHING;
     }
     let rest = u.x - lobes.p_diffuse;
     @if(clearcoat) {
@@ -226,8 +230,19 @@ fn lobes_are_polished(s: Surface) -> bool {
         && (s.clearcoat == 0.0 || s.coat_alpha < POLISHED_ALPHA);
 }
 
+fn lobes_are_diffuse(s: Surface) -> bool {
+    return max3(diffuse_color(s)) > 0.0;
+}
+
 fn lobes_are_delta(s: Surface) -> bool {
     return max3(diffuse_color(s)) == 0.0 && reflects_delta(s) && (s.clearcoat == 0.0 || coat_delta(s));
+}
+
+fn lobes_straight(s: Surface, wo: vec3<f32>) -> vec3<f32> {
+    if !transmits_delta(s) {
+        return vec3<f32>(0.0);
+    }
+    return interface_at(s, cos_to(s.ns, wo)).transmitted * (1.0 - coat_share(s, wo));
 }
 
 fn lobes_albedo(s: Surface, wo: vec3<f32>) -> vec3<f32> {

@@ -1,6 +1,7 @@
 // Twin of src/material/scatter.rs: the same operations in the same order.
 
 import package::math::{dot3, orthonormal_basis, sincos_2pi};
+import package::packed::records::MATERIAL_NORMAL_MAPPED;
 import package::material::normal::unit;
 import package::material::surface::Surface;
 
@@ -29,13 +30,30 @@ fn delta_sample(wi: vec3<f32>, weight: vec3<f32>, transmitted: bool) -> BsdfSamp
 }
 
 fn lambert_cos(ng: vec3<f32>, ns: vec3<f32>, wi: vec3<f32>) -> f32 {
-    let height = dot3(ng, wi);
-    if height <= 0.0 {
+    if dot3(ng, wi) <= 0.0 {
         return 0.0;
     }
-    let direct = dot3(ns, wi);
-    let mirrored = direct - 2.0 * height * dot3(ng, ns);
-    return max(direct, 0.0) + max(mirrored, 0.0);
+    return max(dot3(ns, wi), 0.0);
+}
+
+fn terminator(ng: vec3<f32>, ns: vec3<f32>, wi: vec3<f32>) -> f32 {
+    let of_facet = dot3(ng, wi);
+    let of_smooth = dot3(ns, wi) * dot3(ng, ns);
+    if of_facet <= 0.0 || of_smooth <= 0.0 {
+        return 0.0;
+    }
+    if of_facet >= of_smooth * NO_FADE {
+        return 1.0;
+    }
+    let g = of_facet / of_smooth;
+    return g * (1.0 + g - g * g);
+}
+
+fn kept_at_terminator(s: Surface, wi: vec3<f32>) -> f32 {
+    if (s.flags & MATERIAL_NORMAL_MAPPED) != 0u {
+        return 1.0;
+    }
+    return terminator(s.ng, s.ns, wi);
 }
 
 fn sample_lambert(s: Surface, u0: f32, u1: f32) -> vec3<f32> {
@@ -43,9 +61,5 @@ fn sample_lambert(s: Surface, u0: f32, u1: f32) -> vec3<f32> {
     let phi = sincos_2pi(u0);
     let radius = sqrt(u1);
     let z = sqrt(max(1.0 - u1, 0.0));
-    let w = unit(basis.t * (radius * phi.cos) + basis.b * (radius * phi.sin) + s.ns * z);
-    if dot3(s.ng, w) < 0.0 {
-        return mirrored_at(s.ng, w);
-    }
-    return w;
+    return unit(basis.t * (radius * phi.cos) + basis.b * (radius * phi.sin) + s.ns * z);
 }

@@ -4,11 +4,13 @@ import package::gpu::buffers::{frame, materials, photo_albedo, texture_refs, tri
 import package::packed::materials::Material;
 import package::packed::records::{
     Vertex, TEXTURE_UV1, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
-    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT,
+    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, PHOTO_PATCHES,
 };
 import package::shared::NONE;
 @if(photo_albedo) import package::camera::lens::camera_project;
 import package::math::{cross3, dot3, safe_sqrt};
+import package::material::facets::{TABLE_SIZE, kept_by_facets};
+import package::material::ggx::{DELTA_ALPHA, transmits_unblurred};
 import package::material::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
 import package::material::texture::{slot, slot_rgb, texture_sample};
 import package::accel::trace::Hit;
@@ -98,7 +100,19 @@ fn photo_albedo_at(position: vec3<f32>, object: u32) -> vec3<f32> {
             return entry.xyz;
         }
     }
-    return photo_albedo[frame.width * frame.height + object].xyz;
+    let first = frame.width * frame.height + object * (2u * PHOTO_PATCHES);
+    var sum = vec3<f32>(0.0);
+    var weights = 0.0;
+    for (var patch_ = 0u; patch_ < PHOTO_PATCHES; patch_++) {
+        let albedo = photo_albedo[first + 2u * patch_];
+        let place = photo_albedo[first + 2u * patch_ + 1u];
+        let away = position - place.xyz;
+        let nearness = 1.0 / max(dot3(away, away) + place.w, NO_DISTANCE2);
+        let weight = albedo.w * (nearness * nearness);
+        sum += albedo.xyz * weight;
+        weights += weight;
+    }
+    return sum * (1.0 / max(weights, NO_DISTANCE2));
 }
 
 fn perturbed(map: u32, scale: f32, normal: vec3<f32>, v0: Vertex, v1: Vertex, v2: Vertex, b: vec3<f32>) -> vec3<f32> {
@@ -233,6 +247,21 @@ fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
         }
     }
     roughness = clamp(roughness, 0.0, 1.0);
+    let alpha = roughness * roughness;
+    var metal_gain = 0.0;
+    var glass_gain = 1.0;
+    @if(facets) {
+        if entry.facet_table != NONE && alpha >= DELTA_ALPHA {
+            let cos = clamp(dot3(wo, ns), 0.0, 1.0);
+            metal_gain = 1.0 / kept_by_facets(0u, alpha, cos) - 1.0;
+            let is_thin = (flags & MATERIAL_THIN_WALLED) != 0u;
+            if transmission > 0.0 && (is_thin || !transmits_unblurred(alpha, entry.ior)) {
+                var first = entry.facet_table;
+                if !is_thin && !front { first += TABLE_SIZE; }
+                glass_gain = 1.0 / kept_by_facets(first, alpha, cos);
+            }
+        }
+    }
     coat_roughness = clamp(coat_roughness, 0.0, 1.0);
     return Surface(
         position,
@@ -242,7 +271,7 @@ fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
         coat_ns,
         base_color,
         clamp(metallic, 0.0, 1.0),
-        roughness * roughness,
+        alpha,
         entry.ior,
         clamp(specular, 0.0, 1.0),
         max(specular_color, vec3<f32>(0.0)),
@@ -256,5 +285,7 @@ fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
         triangle.material,
         triangle.light,
         triangle.object,
+        metal_gain,
+        glass_gain,
     );
 }

@@ -35,6 +35,12 @@ pub(super) fn text(
         ),
     };
     out += &lines(stats, &error);
+    if let Some(share) = renderer.backdrop_share() {
+        out += &format!(
+            "photo   {:.0}% of the light of virtual pixels is the photograph's, seen where nothing is modelled ([photo] backdrop)\n",
+            100.0 * share
+        );
+    }
     if renderer.is_filtered() {
         out += "filter  the difference on diffuse real surfaces is smoothed, a bias; the error is that before the filter\n";
     }

@@ -4,8 +4,10 @@ use glam::Vec3;
 
 use super::state::*;
 use crate::camera::sampler::{SampleKey, SampleSet, sample_set};
-use crate::material::{Surface, bsdf_is_polished};
-use crate::packed::{ESTIMATOR_PAPER, FRAME_NO_PHOTONS, Frame, PackedScene, SIDE_VIRTUAL};
+use crate::material::{Surface, bsdf_is_diffuse, bsdf_is_polished};
+use crate::packed::{
+    ESTIMATOR_PAPER, FRAME_BACKDROP, FRAME_NO_PHOTONS, Frame, PackedScene, SIDE_VIRTUAL,
+};
 use crate::shared::shared;
 
 shared! {
@@ -93,6 +95,25 @@ pub fn vertex_left_to_photons(scene: &PackedScene, st: &PathState, s: &Surface) 
         && st.ray.side == SIDE_VIRTUAL
         && st.path.events & (EVENT_SEEN | EVENT_REAL_CHAIN) == EVENT_SEEN
         && bsdf_is_polished(s)
+}
+
+/// Whether what the path sees of the world that is not modelled is what the photograph shows.
+pub fn sees_backdrop(scene: &PackedScene, st: &PathState) -> bool {
+    scene.frame.flags & FRAME_BACKDROP != 0
+        && st.path.mode == MODE_MIXED
+        && st.path.events & EVENT_FROM_LENS != 0
+}
+
+/// [`EVENT_FROM_LENS`] past a vertex, if the path had it: `smooth` as in [`events_after`]. A chain of smooth vertices after one that scatters is the
+/// photons', and they bring the environment.
+pub fn from_lens_after(st: &PathState, s: &Surface, delta: bool, smooth: bool) -> u32 {
+    let looks_through = st.ray.side == SIDE_VIRTUAL && (delta || !bsdf_is_diffuse(s));
+    let left_to_photons = smooth && st.path.events & EVENT_SEEN != 0;
+    if looks_through && !left_to_photons {
+        st.path.events & EVENT_FROM_LENS
+    } else {
+        0
+    }
 }
 
 pub fn photons_traced(frame: &Frame) -> bool {

@@ -7,6 +7,7 @@
 use glam::Vec3;
 
 use super::contribution::*;
+use super::panes::{is_pane, open_share, open_share_real};
 use super::points::{end_capture, end_cone_capture};
 use super::sharing::tile_of;
 use super::state::*;
@@ -15,6 +16,7 @@ use crate::accel::Hit;
 use crate::camera::lens::camera_ray_from;
 use crate::camera::sampler::sample_4d;
 use crate::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
+use crate::light::backdrop::{backdrop_of_pixel, backdrop_radiance};
 use crate::light::cones::{cone_pdf, cones_at};
 use crate::light::environment::{env_radiance, share_left_to_eye};
 use crate::light::lights::env_arriving;
@@ -177,6 +179,7 @@ fn primary_real(st: &mut PathState) {
     if virtual_is_nearer(&st.hits) {
         st.result.mask = 1;
         st.path.mode = MODE_MIXED;
+        st.path.events |= EVENT_FROM_LENS;
         plan_vertex(st, st.hits.in_virtual);
     } else if st.hits.in_real.triangle != NONE {
         // Without throughput the sample has no turn, and the vertex only fills the planes.
@@ -244,10 +247,16 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             return;
         }
         if st.path.pending & PENDING_REAL != 0 {
-            st.path.pending &= !PENDING_REAL;
+            let behind_pane = st.path.pending & PENDING_BEHIND_PANE != 0;
+            st.path.pending &= !(PENDING_REAL | PENDING_BEHIND_PANE);
             end_cone_capture(st);
             st.path.mode = MODE_REAL;
             follow(st, st.real.segment);
+            st.path.events = st.path.events & !EVENT_PASSED | EVENT_FROM_SHARED;
+            if behind_pane {
+                st.path.events |= EVENT_PASSED;
+                st.passed_m = 0.0;
+            }
             st.ray.depth = st.path.real_depth;
             plan_vertex(st, st.real.hit);
             continue;
@@ -332,12 +341,17 @@ fn paper_behind(scene: &PackedScene, st: &mut PathState) {
         path_escape(scene, st);
     }
     st.path.mode = MODE_MIXED;
+    st.path.events |= EVENT_FROM_SHARED;
+    if st.ray.depth == 1 {
+        st.path.events |= EVENT_FROM_LENS;
+    }
     plan_vertex(st, st.hits.in_virtual);
 }
 
 /// A path left the scene: the environment, weighted against the technique that samples it as a light.
 fn path_escape(scene: &PackedScene, st: &mut PathState) {
-    if st.ray.depth == 1 && scene.frame.flags & FRAME_ENV_DRAWN == 0 {
+    let seen_past_panes = st.path.events & EVENT_PASSED != 0;
+    if st.ray.depth == 1 && scene.frame.flags & FRAME_ENV_DRAWN == 0 && !seen_past_panes {
         return;
     }
     let mut light = escaping_light(scene, st);
@@ -348,43 +362,53 @@ fn path_escape(scene: &PackedScene, st: &mut PathState) {
 }
 
 fn escaping_light(scene: &PackedScene, st: &PathState) -> Vec3 {
+    let backdrop = sees_backdrop(scene, st).then(|| backdrop_behind(scene, st));
     if st.path.density == DELTA_DENSITY {
-        return st.path.throughput * env_radiance(scene, st.ray.direction);
+        let radiance = backdrop.unwrap_or_else(|| env_radiance(scene, st.ray.direction));
+        return st.path.throughput * radiance;
     }
-    let (radiance, pdf) = env_arriving(scene, st.ray.direction);
+    let (environment, pdf) = env_arriving(scene, st.ray.direction);
+    let radiance = backdrop.unwrap_or(environment);
     st.path.throughput * radiance * density_weight(st.path.density, pdf)
 }
 
+/// What the path sees of the photograph. Past panes alone it is what its own pixel shows.
+fn backdrop_behind(scene: &PackedScene, st: &PathState) -> Vec3 {
+    if st.ray.depth == 1 {
+        return backdrop_of_pixel(scene, st.path.pixel);
+    }
+    backdrop_radiance(scene, st.ray.origin.position, st.ray.direction)
+}
+
 fn path_shadow(scene: &PackedScene, st: &mut PathState) {
-    let open_virtual = st.hits.in_virtual.triangle == NONE;
-    let open_real = st.hits.in_real.triangle == NONE;
+    let open_real = open_share_real(st);
+    let open_mixed = open_share(st.hits.in_virtual) * open_real;
     let light = st.path.shadow_contribution;
     if st.path.mode == MODE_SHARED {
-        if st.ray.request == REQUEST_SHADOW_PAIR {
-            // The real shadow ray's answer, and the mixed one's.
-            if open_virtual {
-                st.result.radiance += light;
-            }
-            if open_real {
-                st.radiance_real += light;
-            }
-        } else if open_virtual && open_real {
-            st.result.radiance += light;
+        if open_mixed != Vec3::ZERO {
+            st.result.radiance += light * open_mixed;
+        }
+        if st.ray.request == REQUEST_SHADOW_PAIR && open_real != Vec3::ZERO {
+            st.radiance_real += light * open_real;
         }
         return;
     }
-    if open_virtual && open_real {
-        accumulate(scene, st, light);
+    if open_mixed != Vec3::ZERO {
+        accumulate(scene, st, light * open_mixed);
     }
 }
 
-/// A difference shadow ray contributes where only something virtual blocks a real light, or where nothing blocks a virtual one.
+/// A difference shadow ray contributes as far as only something virtual blocks a real light, or as nothing blocks a virtual one.
 fn difference_shadow(st: &mut PathState) {
-    let open_real = st.hits.in_real.triangle == NONE;
-    let open_virtual = st.hits.in_virtual.triangle == NONE;
-    let blocked_alone = st.ray.request == REQUEST_SHADOW_DIFFERENCE;
-    if open_real && open_virtual != blocked_alone {
-        st.result.radiance += st.path.shadow_contribution;
+    let open_virtual = open_share(st.hits.in_virtual);
+    let mut share = open_share_real(st);
+    if st.ray.request == REQUEST_SHADOW_DIFFERENCE {
+        share *= Vec3::ONE - open_virtual;
+    } else {
+        share *= open_virtual;
+    }
+    if share != Vec3::ZERO {
+        st.result.radiance += st.path.shadow_contribution * share;
     }
 }
 
@@ -433,6 +457,9 @@ fn split_difference(scene: &PackedScene, st: &mut PathState) {
         st.result.radiance -= escaping_light(scene, st);
     } else {
         st.path.pending |= PENDING_REAL;
+        if is_pane(scene, st.hits.in_virtual, st.ray.direction) {
+            st.path.pending |= PENDING_BEHIND_PANE;
+        }
         let mut segment = followed(st);
         segment.throughput = -segment.throughput;
         st.real = RealPath {
@@ -442,6 +469,7 @@ fn split_difference(scene: &PackedScene, st: &mut PathState) {
         st.path.real_depth = st.ray.depth + 1;
     }
     st.path.mode = MODE_MIXED;
+    st.path.events |= EVENT_FROM_SHARED;
     st.ray.depth += 1;
     plan_vertex(st, st.hits.in_virtual);
 }

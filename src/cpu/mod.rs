@@ -1,9 +1,11 @@
 //! The CPU backend: the estimator on all cores. It is the reference the shaders are compared with, and the fallback where there is no GPU.
 
+mod backdrop;
 mod batch;
 pub mod contribution;
 pub mod estimator;
 mod in_flight;
+pub mod panes;
 pub mod photons;
 pub mod pilot;
 pub mod points;
@@ -15,5 +17,6 @@ mod surfaces;
 mod tiles;
 pub mod vertex;
 
+pub use backdrop::backdrop_share;
 pub use pilot::{pilot, pilot_steps};
 pub use surfaces::diffuse_surfaces;

@@ -7,10 +7,12 @@ use glam::Vec3;
 
 use super::state::*;
 use crate::material::{Surface, bsdf_is_lambertian};
-use crate::packed::{PIXEL_SHARES, PackedScene};
+use crate::packed::{MATERIAL_NORMAL_MAPPED, PIXEL_SHARES, PackedScene};
 
 fn shares(scene: &PackedScene, st: &PathState) -> bool {
+    // Links between vertices do not look through panes, and what lies behind is not shared.
     scene.pixels[st.path.pixel as usize].flags & PIXEL_SHARES != 0
+        && st.path.events & EVENT_PASSED == 0
 }
 
 /// Keeps the vertex, if it is the first and may use others' points; with the chances that cones and BSDF are played.
@@ -21,7 +23,9 @@ pub fn keep_first_vertex(
     cone_probability: f32,
     bsdf_probability: f32,
 ) {
-    if st.ray.depth != 1 || !shares(scene, st) || !bsdf_is_lambertian(s) {
+    // A link does not know what a normal map tilts.
+    let is_plain = bsdf_is_lambertian(s) && s.flags & MATERIAL_NORMAL_MAPPED == 0;
+    if st.ray.depth != 1 || !shares(scene, st) || !is_plain {
         return;
     }
     let kept = match st.path.mode {

@@ -1,18 +1,21 @@
 //! Answers a sample's ray request. WGSL twin: `shaders/cpu/request.wgsl`.
 
+use glam::Vec3;
+
+use super::panes::{blocks, pass, passage, shadow_answer};
 use super::state::*;
 use crate::accel::{Hit, Ray};
 use crate::material::surface_alpha;
 use crate::math::{hash_combine, length3, uniform_from_bits};
 use crate::packed::{
-    FRAME_ALPHA, FRAME_BOTH_SHADOWS, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, NONE, PackedScene,
-    SIDE_REAL, SIDE_VIRTUAL,
+    FRAME_ALPHA, FRAME_BOTH_SHADOWS, FRAME_PANES, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, NONE,
+    PackedScene, SIDE_REAL, SIDE_VIRTUAL,
 };
 use crate::shared::shared;
 
 shared! {
     /// A ray that meets this many transparent layers ends at the last.
-    const MAX_ALPHA_LAYERS: u32 = 64;
+    const MAX_LAYERS: u32 = 64;
 
     /// The request is answered.
     const QUERY_NONE: u32 = 2;
@@ -62,7 +65,9 @@ fn next_query(scene: &PackedScene, request: u32, step: u32, t_max: f32, hits: &H
             query(SIDE_VIRTUAL, true, covering, true)
         }
         (REQUEST_SHADOW_MIXED, 0) => query(SIDE_VIRTUAL, true, t_max, false),
-        (REQUEST_SHADOW_MIXED, 1) if !met_virtual => query(SIDE_REAL, true, t_max, true),
+        (REQUEST_SHADOW_MIXED, 1) if !blocks(hits.in_virtual) => {
+            query(SIDE_REAL, true, t_max, true)
+        }
         (REQUEST_SHADOW_REAL, 0) => query(SIDE_REAL, true, t_max, true),
         (REQUEST_SHADOW_DIFFERENCE, 0) => query(SIDE_VIRTUAL, true, t_max, false),
         (REQUEST_SHADOW_DIFFERENCE, 1) if met_virtual || asks_both(scene) => {
@@ -70,7 +75,7 @@ fn next_query(scene: &PackedScene, request: u32, step: u32, t_max: f32, hits: &H
         }
         (REQUEST_SHADOW_PAIR, 0) => query(SIDE_REAL, true, t_max, false),
         (REQUEST_SHADOW_PAIR, 1) => query(SIDE_VIRTUAL, true, t_max, false),
-        (REQUEST_SHADOW_PAIR, 2) if !met_virtual => Query {
+        (REQUEST_SHADOW_PAIR, 2) if !blocks(hits.in_virtual) => Query {
             to_real: false,
             ..query(SIDE_REAL, true, t_max, true)
         },
@@ -116,6 +121,7 @@ fn count_rays(scene: &PackedScene, st: &mut PathState) {
 pub fn answer(scene: &PackedScene, st: &mut PathState) {
     let request = st.ray.request;
     let alpha = scene.frame.flags & FRAME_ALPHA != 0;
+    let panes = scene.frame.flags & FRAME_PANES != 0 && is_shadow(request);
     let mut hits = Hits {
         in_real: MISS,
         in_virtual: MISS,
@@ -124,7 +130,8 @@ pub fn answer(scene: &PackedScene, st: &mut PathState) {
     let mut layer = 0;
     let mut t_min = -1.0;
     let mut skip = NONE;
-    // Transparent layers repeat a query from where it stopped.
+    let mut passed = passage();
+    // Transparent layers and panes repeat a query from where it stopped.
     loop {
         let q = next_query(scene, request, step, st.ray.t_max, &hits);
         if q.world == QUERY_NONE {
@@ -135,23 +142,35 @@ pub fn answer(scene: &PackedScene, st: &mut PathState) {
             ray.t_min = t_min;
             ray.skip = skip;
         }
-        let mut hit = trace(scene, &ray, q.world, q.any_hit && !alpha);
-        if alpha {
-            if hit.triangle != NONE && layer + 1 < MAX_ALPHA_LAYERS && !meets(scene, &st.ray, hit) {
+        let mut hit = trace(scene, &ray, q.world, q.any_hit && !alpha && !panes);
+        if (alpha || panes) && hit.triangle != NONE && layer + 1 < MAX_LAYERS {
+            let mut goes_on = alpha && !meets(scene, &st.ray, hit);
+            if panes && !goes_on {
+                let further = pass(scene, passed, hit, ray.direction);
+                goes_on = further.share != Vec3::ZERO;
+                if goes_on {
+                    passed = further;
+                }
+            }
+            if goes_on {
                 t_min = hit.t;
                 skip = hit.triangle;
                 layer += 1;
                 continue;
             }
-            layer = 0;
         }
+        layer = 0;
         if q.any_hit && hit.triangle != NONE {
             // Only that something was met means anything.
             hit.t = 0.0;
         }
+        if panes {
+            hit = shadow_answer(scene, passed, hit, ray.t_max);
+            passed = passage();
+        }
         if q.to_real {
             hits.in_real = hit;
-        } else {
+        } else if q.world == SIDE_VIRTUAL || blocks(hit) {
             hits.in_virtual = hit;
         }
         if q.is_last {

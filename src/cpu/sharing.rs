@@ -15,12 +15,13 @@
 use glam::Vec3;
 
 use super::in_flight::{InFlight, Member};
+use super::panes::blocks;
 use super::request::answer;
 use super::state::*;
 use super::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS};
 use crate::film::is_unusable;
 use crate::light::cones::{cone_pdf, cones_at};
-use crate::material::scatter::lambert_cos;
+use crate::material::scatter::{lambert_cos, terminator};
 use crate::math::{INV_PI, dot3, length3, safe_sqrt};
 use crate::packed::{Frame, NONE, PackedScene, SIDE_REAL, SIDE_VIRTUAL};
 use crate::shared::shared;
@@ -90,7 +91,7 @@ fn link_to(frame: &Frame, first: &FirstVertex, point: &SharedPoint, kind: u32) -
         first.cone_probability * cone_pdf(&cones, direction)
     };
     Link {
-        transfer: cosine * solid_angle,
+        transfer: cosine * terminator(first.ng, first.ns, direction) * solid_angle,
         density: drawn * solid_angle,
     }
 }
@@ -125,9 +126,15 @@ fn sees(
         opacity_seed: 0,
     };
     answer(scene, probe);
-    let open_virtual = probe.hits.in_virtual.triangle == NONE;
-    let open_real = probe.hits.in_real.triangle == NONE;
-    open_real && open_virtual != covered
+    let Hits {
+        in_real,
+        in_virtual,
+    } = probe.hits;
+    if covered {
+        let by_no_pane = blocks(in_virtual) && in_virtual.t == 0.0;
+        return in_real.triangle == NONE && by_no_pane;
+    }
+    in_real.triangle == NONE && in_virtual.triangle == NONE
 }
 
 /// Where the links of a point begin, and the members that may use it: all of the tile, or those of the same quarter.

@@ -72,6 +72,8 @@ shared! {
     pub const PENDING_REAL: u32 = 4;
     /// [`PathState::difference`].
     pub const PENDING_DIFFERENCE: u32 = 8;
+    /// With [`PENDING_REAL`]: what covers the real surface is a pane.
+    pub const PENDING_BEHIND_PANE: u32 = 32;
     /// A vertex to be shaded: `vertex_hit`, reached along the ray. Never left pending while a ray is traced.
     pub const PENDING_VERTEX: u32 = 16;
 
@@ -86,7 +88,21 @@ shared! {
     /// The present vertex of a difference is polished.
     pub const EVENT_AT_POLISHED: u32 = 16;
     /// The guide may have drawn the path's last direction that was not a smooth surface's.
-    pub const EVENT_GUIDED: u32 = 32;
+    pub const EVENT_GUIDED: u32 = 512;
+
+    /// It has gone straight through panes since its last vertex.
+    pub const EVENT_PASSED: u32 = 32;
+    /// Both worlds share its last vertex.
+    pub const EVENT_FROM_SHARED: u32 = 64;
+    /// What the light of the present shadow ray sends through panes of the real world is found by the path that goes through them.
+    pub const EVENT_LIGHT_LEFT_TO_PATH: u32 = 128;
+
+    /// All vertices so far are virtual and scatter no light diffusely: the camera looks through them at what lies behind.
+    pub const EVENT_FROM_LENS: u32 = 256;
+
+    /// Answer to a shadow ray, in the place of a triangle: it has passed panes alone, and the share of light that comes through stands in
+    /// the hit's `t`, `u`, `v`.
+    pub const PANES: u32 = 0xffff_fffe;
 
     /// Density that stands for a delta distribution: no other technique can find its directions.
     pub const DELTA_DENSITY: f32 = -1.0;
@@ -144,7 +160,7 @@ shared! {
         pub opacity_seed: u32,
     }
 
-    /// The answer to a request: nearest hits, or for shadow rays whether there is one.
+    /// The answer to a request: nearest hits, or for shadow rays whether there is one: `t` is then 0, or 1 if panes come before it.
     #[derive(Clone, Copy, Debug)]
     pub struct Hits {
         pub in_real: Hit,
@@ -290,6 +306,8 @@ pub struct PathState {
     pub points: [SharedPoint; POINTS as usize],
     /// The vertex to be shaded next.
     pub vertex_hit: Hit,
+    /// From the last vertex to the pane that the ray leaves, metres; meaningful with [`EVENT_PASSED`].
+    pub passed_m: f32,
     pub rays: SampleRays,
 }
 
@@ -390,6 +408,7 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
         first: NO_FIRST_VERTEX,
         points: [NO_POINT; POINTS as usize],
         vertex_hit: MISS,
+        passed_m: 0.0,
         rays: SampleRays::default(),
     }
 }

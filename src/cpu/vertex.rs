@@ -3,9 +3,14 @@
 use glam::Vec3;
 
 use super::contribution::*;
+use super::panes::{
+    distance_from_vertex, draw_at_pane, is_shared, may_leave_no_vertex, pass_straight,
+    transmittance,
+};
 use super::points::{keep_first_vertex, offer_point};
 use super::state::*;
 use crate::camera::sampler::SampleSet;
+use crate::light::backdrop::backdrop_radiance;
 use crate::light::blocking::light_may_be_blocked;
 use crate::light::cones::{
     Cones, cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres,
@@ -15,13 +20,13 @@ use crate::light::guide::{GUIDE_SHARE, guide_cell, guide_count, guide_pdf, guide
 use crate::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 use crate::material::{
     BsdfSample, Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian,
-    bsdf_is_polished, bsdf_passes_straight, bsdf_sample,
+    bsdf_is_polished, bsdf_passes_straight, bsdf_sample, bsdf_straight,
 };
-use crate::math::{dot3, exp_, safe_sqrt};
+use crate::math::{dot3, safe_sqrt};
 use crate::packed::{
     ESTIMATOR_PAPER, FRAME_BOTH_SHADOWS, FRAME_LIGHTS_SUFFICE, FRAME_NO_CONES,
-    FRAME_NO_LAST_VERTEX, LIGHT_ENVIRONMENT, MATERIAL_QUAD_LIGHT, MATERIAL_THIN_WALLED,
-    MATERIAL_UNLIT, NONE, PackedScene, SIDE_REAL, SIDE_VIRTUAL,
+    FRAME_NO_LAST_VERTEX, FRAME_PANES, LIGHT_ENVIRONMENT, MATERIAL_QUAD_LIGHT,
+    MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE, PackedScene, SIDE_REAL, SIDE_VIRTUAL,
 };
 use crate::shared::shared;
 
@@ -59,19 +64,6 @@ fn is_difference(st: &PathState) -> bool {
     st.path.mode == MODE_DIFFERENCE
 }
 
-/// Share of light that goes a distance (metres) through the volume of a material, or through none.
-pub fn transmittance(scene: &PackedScene, medium: u32, distance: f32) -> Vec3 {
-    if medium == NONE {
-        return Vec3::ONE;
-    }
-    let sigma = scene.materials[medium as usize].sigma_a;
-    Vec3::new(
-        exp_(-sigma[0] * distance),
-        exp_(-sigma[1] * distance),
-        exp_(-sigma[2] * distance),
-    )
-}
-
 /// Adds the emission at the vertex and plans its shadow ray and continuations. A difference vertex (mode `MODE_DIFFERENCE`) does not emit,
 /// for both worlds see it; its throughput multiplies the difference there.
 pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
@@ -80,15 +72,25 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     let distance = st.vertex_hit.t;
     st.path.throughput *= transmittance(scene, st.path.medium, distance);
     if !difference {
-        add_emission(scene, st, s, distance);
+        add_emission(scene, st, s);
     }
-    if st.ray.depth > scene.frame.max_bounces
+    let past_last = st.ray.depth > scene.frame.max_bounces;
+    if past_last && scene.frame.flags & FRAME_PANES == 0
         || s.flags & EMITS_ONLY != 0
         || st.path.throughput == Vec3::ZERO
     {
         return;
     }
     stand_at(scene, st, s, distance);
+    if past_last {
+        // Lights are still seen through panes.
+        if may_leave_no_vertex(scene, st, s, wo) {
+            let direction = st.ray.direction;
+            let throughput = st.path.throughput * bsdf_straight(s, wo);
+            pass_straight(st, direction, throughput, medium_along(st, s, direction));
+        }
+        return;
+    }
     offer_point(scene, st, s);
 
     if difference && bsdf_is_polished(s) {
@@ -185,7 +187,7 @@ fn coincides(st: &PathState, s: &Surface, distance: f32) -> bool {
     dot3(st.ray.direction, offset).abs() * distance <= errors
 }
 
-fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: f32) {
+fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     if s.emission.max_element() <= 0.0 {
         return;
     }
@@ -198,6 +200,7 @@ fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface, distance: 
     let mut weight = 1.0;
     if s.light != NONE && st.path.density != DELTA_DENSITY {
         let direction = st.ray.direction;
+        let distance = distance_from_vertex(st);
         let from_position = s.position - direction * distance;
         let pdf = light_pdf_hit(scene, s.light, from_position, direction, distance);
         weight = density_weight(st.path.density, pdf);
@@ -236,7 +239,13 @@ fn next_event(
     {
         return;
     }
-    let l = light_sample(scene, index, s.position, u.pair());
+    let mut l = light_sample(scene, index, s.position, u.pair());
+    if scene.lights[index as usize].kind == LIGHT_ENVIRONMENT
+        && sees_backdrop(scene, st)
+        && from_lens_after(st, s, false, bsdf_is_polished(s)) != 0
+    {
+        l.radiance = backdrop_radiance(scene, s.position, l.direction);
+    }
     let mut contribution = light_contribution(scene, st, s, wo, techniques, &l);
     if vertex_left_to_photons(scene, st, s) {
         contribution *= light_left_to_eye(scene, index, l.direction);
@@ -311,6 +320,10 @@ fn plan_shadow(st: &mut PathState, s: &Surface, l: &LightSample, contribution: V
         MODE_SHARED if real_light => REQUEST_SHADOW_PAIR,
         _ => REQUEST_SHADOW_MIXED,
     };
+    st.path.events &= !EVENT_LIGHT_LEFT_TO_PATH;
+    if is_shared(st) && !l.delta {
+        st.path.events |= EVENT_LIGHT_LEFT_TO_PATH;
+    }
     st.path.pending |= PENDING_SHADOW;
 }
 
@@ -441,7 +454,12 @@ fn plan_continuation(
     } else {
         SET_PATH_BSDF
     };
-    let u = draw(scene, st, set);
+    let at_pane = may_leave_no_vertex(scene, st, s, wo);
+    let u = if at_pane {
+        draw_at_pane(scene, st)
+    } else {
+        draw(scene, st, set)
+    };
     if techniques.is_some_and(|t| !plays(&u, t.bsdf_probability)) {
         return;
     }
@@ -457,19 +475,27 @@ fn plan_continuation(
         return;
     }
     let straight = b.delta && b.transmitted && bsdf_passes_straight(s);
+    let throughput = st.path.throughput * b.weight;
+    let medium = medium_along(st, s, b.wi);
+    if at_pane && straight {
+        pass_straight(st, b.wi, throughput, medium);
+        return;
+    }
+    let smooth = b.delta || bsdf_is_polished(s);
     let mut events = st.path.events;
     if !straight {
-        let smooth = b.delta || bsdf_is_polished(s);
         events = events_after(events, st.ray.depth, st.ray.side, smooth);
     }
     if share > 0.0 {
         events |= EVENT_GUIDED;
     }
+    let from_lens = from_lens_after(st, s, b.delta, smooth);
+    events = events & !(EVENT_PASSED | EVENT_FROM_SHARED | EVENT_FROM_LENS) | from_lens;
     let mut segment = Segment {
         direction: b.wi,
         density: if b.delta { DELTA_DENSITY } else { b.pdf },
-        throughput: st.path.throughput * b.weight,
-        medium: medium_along(st, s, b.wi),
+        throughput,
+        medium,
     };
     if let Some(t) = techniques {
         segment.throughput *= 1.0 / t.bsdf_probability;
@@ -499,6 +525,6 @@ fn plan_continuation(
         segment.throughput *= 1.0 / survival;
     }
     st.path.pending |= PENDING_NEXT;
-    st.path.events = events;
+    st.path.events = events | st.path.events & EVENT_LIGHT_LEFT_TO_PATH;
     st.next = segment;
 }

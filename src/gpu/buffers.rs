@@ -37,6 +37,8 @@ pub struct SceneParts<'a> {
     pub env_cdf: &'a [f32],
     pub photo_albedo: &'a [[f32; 4]],
     pub guide: &'a [[f32; 4]],
+    pub backdrop: &'a [f32],
+    pub facet_tables: &'a [f32],
     pub pixels: &'a [PixelInfo],
     /// Both worlds, the real one first, each as [`WorldBvh::gpu_nodes`].
     pub bvh_nodes: [[&'a [[[u32; 4]; 5]]; 3]; 2],
@@ -59,6 +61,8 @@ impl Default for SceneParts<'_> {
             env_cdf: &[],
             photo_albedo: &[],
             guide: &[],
+            backdrop: &[],
+            facet_tables: &[],
             pixels: &[],
             bvh_nodes: [[&[]; 3]; 2],
             bvh_leaves: [[&[]; 2]; 2],
@@ -82,6 +86,8 @@ impl<'a> From<&'a PackedScene> for SceneParts<'a> {
             env_cdf: &scene.env_cdf,
             photo_albedo: &scene.photo_albedo,
             guide: &scene.guide,
+            backdrop: &scene.backdrop,
+            facet_tables: &scene.facet_tables,
             pixels: &scene.pixels,
             bvh_nodes: worlds.map(WorldBvh::gpu_nodes),
             bvh_leaves: worlds.map(WorldBvh::gpu_leaves),
@@ -187,7 +193,7 @@ impl Array<'_> {
     }
 }
 
-fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 13] {
+fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 15] {
     use Changed::{All, Moving, View, Virtual};
     let array = |name, what, pieces| Array { name, what, pieces };
     let SceneParts {
@@ -203,6 +209,8 @@ fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 13] {
         env_cdf,
         photo_albedo,
         guide,
+        backdrop,
+        facet_tables,
         pixels,
         bvh_nodes: [[real_roots, real_nodes, _], [roots, nodes, moving_nodes]],
         bvh_leaves: [[real_leaves, _], [leaves, moving_leaves]],
@@ -236,6 +244,12 @@ fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 13] {
             vec![piece(View, photo_albedo)],
         ),
         array("guide", "guide", vec![piece(View, guide)]),
+        array("backdrop", "photograph", vec![piece(View, backdrop)]),
+        array(
+            "facet_tables",
+            "tables of rough lobes",
+            vec![piece(Virtual, facet_tables)],
+        ),
         array("pixels", "pixels", vec![piece(View, pixels)]),
         array(
             "bvh_nodes",

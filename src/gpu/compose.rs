@@ -76,6 +76,12 @@ features! {
     photons,
     /// What photons found guides paths that are seen by way of smooth surfaces.
     guide,
+    /// Light goes straight through some material.
+    panes,
+    /// Facets send light to each other.
+    facets,
+    /// Virtual objects show the photograph behind them.
+    backdrop,
 }
 
 impl Features {
@@ -123,6 +129,9 @@ impl Features {
             sharing: (scene.pixels.iter()).any(|info| info.flags & packed::PIXEL_SHARES != 0),
             photons: cpu::contribution::photons_traced(&scene.frame),
             guide: scene.frame.guide_cell_count > 0,
+            panes: scene.frame.flags & packed::FRAME_PANES != 0,
+            facets: !scene.facet_tables.is_empty(),
+            backdrop: scene.frame.flags & packed::FRAME_BACKDROP != 0,
         }
     }
 }
@@ -158,11 +167,14 @@ pub(super) const DECLARED: &[&Module] = &[
     &camera::sampler::SHARED,
     &camera::shutter::SHARED,
     &camera::splat::SHARED,
+    &cpu::panes::SHARED,
+    &light::backdrop::SHARED,
     &light::cones::SHARED,
     &light::environment::SHARED,
     &light::guide::SHARED,
     &light::lights::SHARED,
     &light::rectangle::SHARED,
+    &material::facets::SHARED,
     &material::fresnel::SHARED,
     &material::ggx::SHARED,
     &material::interface::SHARED,

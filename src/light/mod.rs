@@ -1,5 +1,6 @@
 //! Light: emitters, the environment, and the cones in which virtual geometry is seen.
 
+pub mod backdrop;
 pub mod blocking;
 pub mod cones;
 pub mod environment;

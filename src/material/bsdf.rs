@@ -4,10 +4,12 @@ use glam::Vec3;
 
 use super::interface::{max3, surface_index, thin_walled};
 use super::lobes::{
-    lobes_albedo, lobes_are_delta, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample,
+    lobes_albedo, lobes_are_delta, lobes_are_diffuse, lobes_are_polished, lobes_bound, lobes_eval,
+    lobes_sample, lobes_straight,
 };
 use super::scatter::{
-    BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, lambert_cos, sample_lambert,
+    BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, kept_at_terminator, lambert_cos,
+    sample_lambert,
 };
 use super::surface::Surface;
 use crate::math::INV_PI;
@@ -25,7 +27,7 @@ pub fn bsdf_eval(s: &Surface, wo: Vec3, wi: Vec3) -> BsdfEval {
     if bsdf_is_lambertian(s) {
         let pdf = lambert_cos(s.ng, s.ns, wi) * INV_PI;
         return BsdfEval {
-            f_cos: s.base_color * pdf,
+            f_cos: s.base_color * (pdf * kept_at_terminator(s, wi)),
             pdf,
         };
     }
@@ -47,7 +49,7 @@ pub fn bsdf_sample(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
     }
     BsdfSample {
         wi,
-        weight: s.base_color,
+        weight: s.base_color * kept_at_terminator(s, wi),
         pdf,
         delta: false,
         transmitted: false,
@@ -66,6 +68,11 @@ pub fn bsdf_is_delta(s: &Surface) -> bool {
     lobes_are_delta(s)
 }
 
+/// Some of the light that it scatters goes everywhere.
+pub fn bsdf_is_diffuse(s: &Surface) -> bool {
+    bsdf_is_lambertian(s) || lobes_are_diffuse(s)
+}
+
 /// Nothing but lobes that mirror or bend light with little blur: as far as photons go, it is smooth.
 pub fn bsdf_is_polished(s: &Surface) -> bool {
     !scatters_nothing(s) && !bsdf_is_lambertian(s) && lobes_are_polished(s)
@@ -74,6 +81,14 @@ pub fn bsdf_is_polished(s: &Surface) -> bool {
 /// What a smooth interface lets through goes straight on: it bends nothing.
 pub fn bsdf_passes_straight(s: &Surface) -> bool {
     thin_walled(s) || surface_index(s).eta2_minus_1 == 0.0
+}
+
+/// Share of the light from straight behind that comes through unbent and unblurred.
+pub fn bsdf_straight(s: &Surface, wo: Vec3) -> Vec3 {
+    if scatters_nothing(s) || bsdf_is_lambertian(s) || !bsdf_passes_straight(s) {
+        return Vec3::ZERO;
+    }
+    lobes_straight(s, wo)
 }
 
 /// Index of the volume beyond the surface over that on the side of the ray.

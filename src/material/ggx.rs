@@ -11,6 +11,10 @@ use crate::shared::shared;
 use super::normal::unit;
 
 shared! {
+    /// GGX alpha under which a lobe counts as perfectly smooth: roughness 0.0316, a blur of a tenth of a degree.
+    pub const DELTA_ALPHA: f32 = 1e-3;
+    /// A rough interface bends light by about alpha * |ior - 1|; below this the bend is lost in f32 and light goes through unblurred.
+    const DELTA_BEND: f32 = 1e-4;
     /// Cosines between `wo` and the normal are taken as no smaller than this.
     pub const MIN_COS: f32 = 1e-7;
 
@@ -24,6 +28,11 @@ shared! {
         /// Cosine between `wo` and the half vector.
         pub cos_half: f32,
     }
+}
+
+/// Whether the interface of a volume with that index, of a GGX alpha, lets light through unblurred.
+pub fn transmits_unblurred(alpha: f32, ior: f32) -> bool {
+    alpha < DELTA_ALPHA || alpha * (ior - 1.0).abs() < DELTA_BEND
 }
 
 /// L(c) above, for c >= 0.

@@ -5,16 +5,12 @@ use glam::Vec3;
 use super::fresnel::{
     RelativeIndex, fresnel_dielectric, normal_reflectance, relative_index, schlick,
 };
-use super::ggx::MIN_COS;
+use super::ggx::{DELTA_ALPHA, MIN_COS, transmits_unblurred};
 use super::surface::Surface;
 use crate::packed::MATERIAL_THIN_WALLED;
 use crate::shared::shared;
 
 shared! {
-    /// GGX alpha under which a lobe counts as perfectly smooth: roughness 0.0316, a blur of a tenth of a degree.
-    pub const DELTA_ALPHA: f32 = 1e-3;
-    /// A rough interface bends light by about alpha * |ior - 1|; below this the bend is lost in f32 and light goes through unblurred.
-    const DELTA_BEND: f32 = 1e-4;
     /// Albedos up to this count as none: their reciprocal would overflow.
     pub const NO_ALBEDO: f32 = 1e-30;
 
@@ -42,11 +38,6 @@ pub fn thin_walled(s: &Surface) -> bool {
 
 pub fn surface_index(s: &Surface) -> RelativeIndex {
     relative_index(s.ior, s.front || thin_walled(s))
-}
-
-/// Whether the interface of a volume with that index, of a GGX alpha, lets light through unblurred.
-pub fn transmits_unblurred(alpha: f32, ior: f32) -> bool {
-    alpha < DELTA_ALPHA || alpha * (ior - 1.0).abs() < DELTA_BEND
 }
 
 pub fn reflects_delta(s: &Surface) -> bool {
@@ -90,11 +81,12 @@ fn transmitting_fresnel(s: &Surface, cos: f32) -> Vec3 {
 
 pub fn interface_at(s: &Surface, cos: f32) -> Interface {
     let dielectric = 1.0 - s.metallic;
-    let mut reflected = schlick(s.base_color, cos) * s.metallic
-        + opaque_fresnel(s, cos) * (dielectric * (1.0 - s.transmission));
+    let metal = schlick(s.base_color, cos) * (Vec3::ONE + s.base_color * s.metal_gain);
+    let mut reflected =
+        metal * s.metallic + opaque_fresnel(s, cos) * (dielectric * (1.0 - s.transmission));
     let mut transmitted = Vec3::ZERO;
     if s.transmission > 0.0 {
-        let share = dielectric * s.transmission;
+        let share = dielectric * s.transmission * s.glass_gain;
         let f = transmitting_fresnel(s, cos);
         reflected += f * share;
         transmitted = s.base_color * (share * (1.0 - max3(f)));

@@ -20,15 +20,15 @@
 use glam::Vec3;
 
 use super::fresnel::{fresnel_dielectric, refract_about, schlick};
-use super::ggx::{ggx_reflect, ggx_refract, ggx_sample_half};
+use super::ggx::{DELTA_ALPHA, ggx_reflect, ggx_refract, ggx_sample_half};
 use super::interface::{
-    DELTA_ALPHA, Interface, NO_ALBEDO, cos_to, grazing_albedo, interface_at, max3, opaque_fresnel,
+    Interface, NO_ALBEDO, cos_to, grazing_albedo, interface_at, max3, opaque_fresnel,
     reflects_delta, surface_index, thin_walled, transmits_delta,
 };
 use super::normal::unit;
 use super::scatter::{
-    BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, delta_sample, lambert_cos, mirrored_at,
-    on_side, reflected_about, sample_lambert,
+    BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, delta_sample, kept_at_terminator,
+    lambert_cos, mirrored_at, on_side, reflected_about, sample_lambert,
 };
 use super::surface::Surface;
 use crate::math::INV_PI;
@@ -132,7 +132,8 @@ fn eval_reflection(s: &Surface, lobes: &Lobes, wo: Vec3, wi: Vec3) -> BsdfEval {
         let cos_half = 0.5 * sum.dot(sum).sqrt();
         let cosine = lambert_cos(s.ng, s.ns, wi) * INV_PI;
         let passed = 1.0 - max3(opaque_fresnel(s, cos_half));
-        f_cos += diffuse_color(s) * (under * passed * cosine);
+        let kept = kept_at_terminator(s, wi);
+        f_cos += diffuse_color(s) * (under * passed * cosine * kept);
         pdf += lobes.p_diffuse * cosine;
     }
     if lobes.p_interface > 0.0 && !reflects_delta(s) {
@@ -189,7 +190,12 @@ pub fn lobes_sample(s: &Surface, wo: Vec3, u: [f32; 3]) -> BsdfSample {
         return SAMPLE_NOTHING;
     }
     if u[0] < lobes.p_diffuse {
-        return mixture_sample(s, &lobes, wo, sample_lambert(s, u[1], u[2]));
+        let wi = sample_lambert(s, u[1], u[2]);
+        return if s.ng.dot(wi) > 0.0 {
+            mixture_sample(s, &lobes, wo, wi)
+        } else {
+            SAMPLE_NOTHING
+        };
     }
     let rest = u[0] - lobes.p_diffuse;
     if !(rest < lobes.p_interface || lobes.p_coat == 0.0) {
@@ -279,9 +285,21 @@ pub fn lobes_are_polished(s: &Surface) -> bool {
         && (s.clearcoat == 0.0 || s.coat_alpha < POLISHED_ALPHA)
 }
 
+pub fn lobes_are_diffuse(s: &Surface) -> bool {
+    max3(diffuse_color(s)) > 0.0
+}
+
 /// Nothing but delta lobes.
 pub fn lobes_are_delta(s: &Surface) -> bool {
     max3(diffuse_color(s)) == 0.0 && reflects_delta(s) && (s.clearcoat == 0.0 || coat_delta(s))
+}
+
+/// What an interface that bends and blurs nothing lets through.
+pub fn lobes_straight(s: &Surface, wo: Vec3) -> Vec3 {
+    if !transmits_delta(s) {
+        return Vec3::ZERO;
+    }
+    interface_at(s, cos_to(s.ns, wo)).transmitted * (1.0 - coat_share(s, wo))
 }
 
 /// Approximate share of light from everywhere that leaves towards `wo`, transmission included.

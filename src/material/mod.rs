@@ -4,6 +4,7 @@
 //! Each file has a WGSL twin of the same name in `shaders/`.
 
 pub(crate) mod bsdf;
+pub(crate) mod facets;
 pub(crate) mod fresnel;
 pub(crate) mod ggx;
 pub(crate) mod interface;
@@ -17,9 +18,10 @@ pub(crate) mod texture;
 
 pub use bsdf::{
     bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_index_ratio, bsdf_is_delta,
-    bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample,
+    bsdf_is_diffuse, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample,
+    bsdf_straight,
 };
-pub use interface::{DELTA_ALPHA, transmits_unblurred};
+pub use ggx::{DELTA_ALPHA, transmits_unblurred};
 pub use lobes::POLISHED_ALPHA;
 pub use scatter::{BsdfEval, BsdfSample};
 pub use surface::{Surface, surface_alpha, surface_at, triangle_emission};

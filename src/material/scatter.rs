@@ -5,11 +5,14 @@ use glam::Vec3;
 use super::normal::unit;
 use super::surface::Surface;
 use crate::math::{orthonormal_basis, sincos_2pi};
+use crate::packed::MATERIAL_NORMAL_MAPPED;
 use crate::shared::shared;
 
 shared! {
     /// A mirrored or refracted direction that rounding put on the wrong side of the surface is lifted to this height.
     const GRAZING_LIFT: f32 = 1e-4;
+    /// Facets whose cosine is this much of the smooth surface's fade no light: the share would differ from 1 by rounding alone.
+    const NO_FADE: f32 = 0.9999;
 
     /// Non-delta lobes for one pair of directions.
     #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,28 +85,42 @@ pub fn delta_sample(wi: Vec3, weight: Vec3, transmitted: bool) -> BsdfSample {
     }
 }
 
-/// Cosine of Lambert's law for a shading normal that differs from the geometric one: directions of the shading hemisphere that lie
-/// under the surface are mirrored up at it, so that no energy is lost and a white Lambertian mesh reflects all light.
+/// Cosine of Lambert's law about the shading normal, of directions above the surface. What of the shading hemisphere lies under it is lost.
 pub fn lambert_cos(ng: Vec3, ns: Vec3, wi: Vec3) -> f32 {
-    let height = ng.dot(wi);
-    if height <= 0.0 {
+    if ng.dot(wi) <= 0.0 {
         return 0.0;
     }
-    let direct = ns.dot(wi);
-    let mirrored = direct - 2.0 * height * ng.dot(ns);
-    direct.max(0.0) + mirrored.max(0.0)
+    ns.dot(wi).max(0.0)
 }
 
-/// A direction about the shading normal by Lambert's law, mirrored up where it is under the surface.
+/// Share of the light that the facets of a smooth mesh keep, so that it fades towards the horizon of each instead of ending there (Chiang, Li and
+/// Burley 2019, "Taming the shadow terminator"). The tilt of a normal map is real, and fades nothing.
+pub fn terminator(ng: Vec3, ns: Vec3, wi: Vec3) -> f32 {
+    let of_facet = ng.dot(wi);
+    let of_smooth = ns.dot(wi) * ng.dot(ns);
+    if of_facet <= 0.0 || of_smooth <= 0.0 {
+        return 0.0;
+    }
+    if of_facet >= of_smooth * NO_FADE {
+        return 1.0;
+    }
+    let g = of_facet / of_smooth;
+    g * (1.0 + g - g * g)
+}
+
+/// [`terminator`] of a surface.
+pub fn kept_at_terminator(s: &Surface, wi: Vec3) -> f32 {
+    if s.flags & MATERIAL_NORMAL_MAPPED != 0 {
+        return 1.0;
+    }
+    terminator(s.ng, s.ns, wi)
+}
+
+/// A direction about the shading normal by Lambert's law; it may lie under the surface.
 pub fn sample_lambert(s: &Surface, u0: f32, u1: f32) -> Vec3 {
     let (tangent, bitangent) = orthonormal_basis(s.ns);
     let (sin_phi, cos_phi) = sincos_2pi(u0);
     let radius = u1.sqrt();
     let z = (1.0 - u1).max(0.0).sqrt();
-    let w = unit(tangent * (radius * cos_phi) + bitangent * (radius * sin_phi) + s.ns * z);
-    if s.ng.dot(w) < 0.0 {
-        mirrored_at(s.ng, w)
-    } else {
-        w
-    }
+    unit(tangent * (radius * cos_phi) + bitangent * (radius * sin_phi) + s.ns * z)
 }

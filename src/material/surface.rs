@@ -8,10 +8,12 @@ use crate::math::{cross3, dot3, safe_sqrt};
 use crate::packed::{
     MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
     MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, Material, NONE,
-    PackedScene, TEXTURE_UV1, Vertex, xyz,
+    PHOTO_PATCHES, PackedScene, TEXTURE_UV1, Vertex, xyz,
 };
 use crate::shared::shared;
 
+use super::facets::{TABLE_SIZE, kept_by_facets};
+use super::ggx::{DELTA_ALPHA, transmits_unblurred};
 use super::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
 use super::texture::{slot, slot_rgb, texture_sample};
 
@@ -26,6 +28,8 @@ shared! {
     const SLIMMEST: f32 = 1e-4;
     /// Relative difference up to which a depth in `photo_albedo` is the point's own.
     const PHOTO_DEPTH_TOLERANCE: f32 = 0.02;
+    /// Squared distances and weights below it are none.
+    const NO_DISTANCE2: f32 = 1e-12;
 
     /// What the scattering functions need to know about a point.
     #[derive(Clone, Copy, Debug)]
@@ -67,6 +71,10 @@ shared! {
         pub light: u32,
         /// Scene object, or NONE for quad lights.
         pub object: u32,
+        /// What metal's facets send on by way of others, over what they send at once, for a colour of 1.
+        pub metal_gain: f32,
+        /// What glass sends in all over what its facets send at once.
+        pub glass_gain: f32,
     }
 }
 
@@ -146,7 +154,8 @@ pub fn triangle_emission(scene: &PackedScene, triangle: u32, u: f32, v: f32) -> 
     emission * surface_alpha(scene, hit)
 }
 
-/// Albedo that the photograph's pixel over `position` was found to have: the object's median where the camera does not see the point.
+/// Albedo that the photograph's pixel over `position` was found to have. Where the camera does not see the point, the mean over what it sees of
+/// the object, nearer parts before farther ones.
 fn photo_albedo_at(scene: &PackedScene, position: Vec3, object: u32) -> Vec3 {
     let frame = &scene.frame;
     let seen = camera_project(frame, position);
@@ -157,8 +166,18 @@ fn photo_albedo_at(scene: &PackedScene, position: Vec3, object: u32) -> Vec3 {
             return Vec3::new(r, g, b);
         }
     }
-    let [r, g, b, _] = scene.photo_albedo[(frame.width * frame.height + object) as usize];
-    Vec3::new(r, g, b)
+    let first = frame.width * frame.height + object * (2 * PHOTO_PATCHES);
+    let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+    for patch in 0..PHOTO_PATCHES {
+        let albedo = scene.photo_albedo[(first + 2 * patch) as usize];
+        let place = scene.photo_albedo[(first + 2 * patch + 1) as usize];
+        let away = position - xyz(place);
+        let nearness = 1.0 / (dot3(away, away) + place[3]).max(NO_DISTANCE2);
+        let weight = albedo[3] * (nearness * nearness);
+        sum += xyz(albedo) * weight;
+        weights += weight;
+    }
+    sum * (1.0 / weights.max(NO_DISTANCE2))
 }
 
 /// `normal` as the normal map of slot `map` perturbs it; unchanged without a map.
@@ -321,6 +340,20 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
         coat_ns = valid_shading_normal(ng, coat_ns, wo);
     }
     roughness = roughness.clamp(0.0, 1.0);
+    let alpha = roughness * roughness;
+    let (mut metal_gain, mut glass_gain) = (0.0, 1.0);
+    if material.facet_table != NONE && alpha >= DELTA_ALPHA {
+        let cos = wo.dot(ns).clamp(0.0, 1.0);
+        metal_gain = 1.0 / kept_by_facets(scene, 0, alpha, cos) - 1.0;
+        let is_thin = flags & MATERIAL_THIN_WALLED != 0;
+        if transmission > 0.0 && (is_thin || !transmits_unblurred(alpha, material.ior)) {
+            let mut first = material.facet_table;
+            if !is_thin && !front {
+                first += TABLE_SIZE;
+            }
+            glass_gain = 1.0 / kept_by_facets(scene, first, alpha, cos);
+        }
+    }
     coat_roughness = coat_roughness.clamp(0.0, 1.0);
     Surface {
         position,
@@ -330,7 +363,7 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
         coat_ns,
         base_color,
         metallic: metallic.clamp(0.0, 1.0),
-        ggx_alpha: roughness * roughness,
+        ggx_alpha: alpha,
         ior: material.ior,
         specular: specular.clamp(0.0, 1.0),
         specular_color: specular_color.max(Vec3::ZERO),
@@ -344,5 +377,7 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
         material: triangle.material,
         light: triangle.light,
         object: triangle.object,
+        metal_gain,
+        glass_gain,
     }
 }

@@ -118,6 +118,8 @@ impl PackedScene {
             .iter()
             .any(|m| m.flags & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND) != 0);
         self.frame.flags = self.frame.flags & !FRAME_ALPHA | if alpha { FRAME_ALPHA } else { 0 };
+        self.mark_panes();
+        self.pack_facets(scene);
         pack_lights(self, scene);
         self.pack_photons();
         Ok(())

@@ -1,9 +1,13 @@
 //! From a scene, f64, to what backends read ([`PackedScene`](crate::packed::PackedScene)), f32.
 
+mod backdrop;
 mod build;
 pub mod camera;
+mod facets;
 mod lights;
+mod panes;
 mod photons;
+mod shadows;
 mod shutter;
 #[cfg(test)]
 mod test_support;

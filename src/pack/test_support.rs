@@ -3,8 +3,8 @@
 use glam::DMat4;
 
 use crate::scene::{
-    Aperture, BackendChoice, Camera, Composite, Estimator, Exposure, Instance, Lens, Material,
-    Object, Primitive, SamplerKind, Scene, Settings, Side, Stages,
+    Aperture, Backdrop, BackendChoice, Camera, Composite, Estimator, Exposure, Instance, Lens,
+    Material, Object, Primitive, SamplerKind, Scene, Settings, Side, Stages,
 };
 
 /// A camera of 4 x 3 pixels at the origin that looks along -Z, and nothing else.
@@ -43,7 +43,9 @@ pub fn test_scene() -> Scene {
             sampler: SamplerKind::Sobol,
             composite: Composite::Additive,
             backend: BackendChoice::Cpu,
+            multiple_scattering: false,
             exposure: Exposure::Ev(0.0),
+            backdrop: Backdrop::Environment,
         },
         inputs: Vec::new(),
         stages: Stages::default(),

@@ -363,3 +363,35 @@ fn what_moves_is_packed_anew_as_if_all_were_and_what_rests_stays() {
     packed.rebuild_virtual(&scene).expect("packs");
     assert_ne!(resting(&packed), resting_of(&old), "control");
 }
+
+/// A glass triangle a metre across, under a square lamp of that side two metres above it.
+fn glass_under_a_lamp(side: f64) -> PackedScene {
+    let glass = SceneMaterial {
+        transmission: 1.0,
+        roughness: 0.0,
+        ..SceneMaterial::default()
+    };
+    let corners = [[-0.5, 0.0, -0.5], [0.5, 0.0, -0.5], [0.0, 0.0, 0.5]];
+    let mut scene = test_scene();
+    scene.objects = vec![test_mesh(Side::Virtual, &corners, &[[0, 1, 2]], glass)];
+    scene.lights = vec![SceneLight {
+        side: Side::Real,
+        kind: LightKind::Quad {
+            corner: [-0.5 * side, 2.0, -0.5 * side],
+            edge_u: [side, 0.0, 0.0],
+            edge_v: [0.0, 0.0, side],
+            radiance: [5.0; 3],
+        },
+    }];
+    PackedScene::build(&scene, &Watcher::none()).expect("packs")
+}
+
+#[test]
+fn photons_leave_large_lamps_to_the_eye() {
+    let small = glass_under_a_lamp(0.3);
+    assert!(small.frame.photon_sphere_count > 0);
+    assert_eq!(small.lights[0].photon_pdf, 1.0);
+    let large = glass_under_a_lamp(4.0);
+    assert_eq!(large.frame.photon_sphere_count, 0);
+    assert_eq!(large.lights[0].photon_pdf, 0.0);
+}

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 use super::{
-    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
-    MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, NONE,
-    PackedScene, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1, TEXTURE_WRAP_U_SHIFT,
-    TEXTURE_WRAP_V_SHIFT, TextureRef, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT,
+    MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_NORMAL_MAPPED,
+    MATERIAL_PHOTO_ALBEDO, MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED,
+    MATERIAL_UNLIT, NONE, PackedScene, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1,
+    TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT, TextureRef, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT,
 };
 use crate::scene::{self, AlphaMode, Texture, Wrap};
 use crate::shared::shared;
@@ -47,7 +47,8 @@ shared! {
         pub clearcoat_texture: u32,
         pub clearcoat_roughness_texture: u32,
         pub clearcoat_normal_texture: u32,
-        pub pad: u32,
+        /// First float of its glass in `PackedScene::facet_tables`, 0 for metal; NONE: what facets send to each other is lost.
+        pub facet_table: u32,
     }
 }
 
@@ -135,7 +136,7 @@ impl MaterialTable {
             clearcoat_texture: slot(&m.clearcoat_texture, false),
             clearcoat_roughness_texture: slot(&m.clearcoat_roughness_texture, false),
             clearcoat_normal_texture: slot(&m.clearcoat_normal_texture, false),
-            pad: 0,
+            facet_table: NONE,
         }
     }
 
@@ -202,7 +203,7 @@ impl MaterialTable {
             clearcoat_texture: NONE,
             clearcoat_roughness_texture: NONE,
             clearcoat_normal_texture: NONE,
-            pad: 0,
+            facet_table: NONE,
         }
     }
 }
@@ -221,6 +222,7 @@ fn flags(m: &scene::Material, from_photo: bool) -> u32 {
         | bit(m.thin_walled, MATERIAL_THIN_WALLED)
         | bit(from_photo, MATERIAL_PHOTO_ALBEDO)
         | bit(m.textures().next().is_some(), MATERIAL_TEXTURED)
+        | bit(m.normal_texture.is_some(), MATERIAL_NORMAL_MAPPED)
 }
 
 /// KHR_materials_volume: white light becomes `color` after `distance_m`. A black channel absorbs within a thousandth of it.

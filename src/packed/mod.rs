@@ -34,10 +34,17 @@ pub struct PackedScene {
     /// Cumulative distributions of the environment's cells (see `light::environment_table::EnvironmentTable`).
     pub env_cdf: Vec<f32>,
     /// For `albedo = "from-photo"`, empty where unused: albedo of the photograph's pixels and the depth (metres along the axis) it was seen
-    /// at, then for each scene object the median that its points take which the camera does not see.
+    /// at, then for each scene object its patches, [`records::PHOTO_PATCHES`] pairs: mean albedo of the pixels that see a part of it and how many
+    /// they are; their mean position, metres, and mean squared distance from it.
     pub photo_albedo: Vec<[f32; 4]>,
     /// Lobes of the cells of `light::guide`: the point that each is about and 1 - cos of its half-angle, 0 where a cell has no more.
     pub guide: Vec<[f32; 4]>,
+    /// What rough lobes keep of light: metal, then the glasses (see `material::facets`); empty where none is rough.
+    pub facet_tables: Vec<f32>,
+    /// Indices of the glasses in it, as bits, and where their tables begin.
+    pub(crate) facet_table_of: Vec<(u32, u32)>,
+    /// Linear values of the photograph's pixels, three floats each, row-major, where paths may see it (`FRAME_BACKDROP`); else empty.
+    pub backdrop: Vec<f32>,
     /// One word a pixel: what the pilot found (see [`PixelInfo`]).
     pub pixels: Vec<PixelInfo>,
     /// What bounds moving objects over the whole time of the shutter; empty where nothing moves: then the frame's spheres do.
@@ -90,6 +97,9 @@ impl PackedScene {
             env_cdf: Vec::new(),
             photo_albedo: Vec::new(),
             guide: Vec::new(),
+            facet_tables: Vec::new(),
+            facet_table_of: Vec::new(),
+            backdrop: Vec::new(),
             pixels: Vec::new(),
             swept_spheres: Vec::new(),
             material_table: materials::MaterialTable::default(),

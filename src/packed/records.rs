@@ -7,6 +7,9 @@ use glam::Vec3;
 use crate::shared::shared;
 
 shared! {
+    /// Patches of an object that the photograph shows: what its other points take their albedo from.
+    pub const PHOTO_PATCHES: u32 = 16;
+
     /// Bounding spheres of the virtual geometry, at most this many.
     pub const MAX_SPHERES: usize = 16;
 
@@ -89,7 +92,8 @@ shared! {
         /// Cells of the guide, a power of two; 0: there is none.
         pub guide_cell_count: u32,
         pub guide_cells_per_m: f32,
-        pub pad_end: u32,
+        /// 1 / distance of the backdrop along the view axis; 0: infinitely far.
+        pub inv_backdrop_distance: f32,
     }
 
     pub const APERTURE_DISC: u32 = 0;
@@ -127,6 +131,10 @@ shared! {
     pub const FRAME_NO_PHOTONS: u32 = 512;
     /// Without the saving `guide`. No shader reads it.
     pub const FRAME_NO_GUIDE: u32 = 8192;
+    /// Some material is a pane ([`MATERIAL_PANE`]).
+    pub const FRAME_PANES: u32 = 2048;
+    /// Paths that leave virtual objects see the photograph.
+    pub const FRAME_BACKDROP: u32 = 4096;
 
     #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
     pub struct Vertex {
@@ -165,6 +173,10 @@ shared! {
     pub const MATERIAL_QUAD_LIGHT: u32 = 64;
     /// Some texture is referenced.
     pub const MATERIAL_TEXTURED: u32 = 128;
+    /// A normal map tilts the shading normal.
+    pub const MATERIAL_NORMAL_MAPPED: u32 = 512;
+    /// Somewhere light goes straight through: a smooth thin wall, or a volume of index 1.
+    pub const MATERIAL_PANE: u32 = 256;
 
     pub const TEXTURE_SRGB: u32 = 1;
     pub const TEXTURE_NEAREST: u32 = 2;

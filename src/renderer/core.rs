@@ -25,6 +25,8 @@ pub(super) struct Core {
     pub seconds: Seconds,
     /// Things the user should hear: fallbacks taken, values fitted.
     pub notes: Vec<String>,
+    /// Share of the light of virtual pixels that comes from the photograph as their backdrop.
+    pub backdrop_share: Option<f64>,
     /// The picture's time.
     pub time_secs: f64,
 }

@@ -195,6 +195,7 @@ impl Renderer {
                 rays: RayCounts::default(),
                 seconds: Seconds::default(),
                 notes: Vec::new(),
+                backdrop_share: None,
             },
             driver: Driver::Still,
             end_sample,
@@ -284,6 +285,11 @@ impl Renderer {
 
     pub fn seconds(&self) -> Seconds {
         self.core.seconds
+    }
+
+    /// Share of the light of virtual pixels that they show of the photograph, where nothing is modelled behind them; estimated from a few samples.
+    pub fn backdrop_share(&self) -> Option<f64> {
+        self.core.backdrop_share
     }
 
     /// Things the user should hear: fallbacks taken, values fitted.

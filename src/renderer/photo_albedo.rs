@@ -4,7 +4,7 @@
 //! through the real world, spread to all pixels by a filter that respects depth and normal, and A = Ic / (E / pi). Light between real surfaces
 //! depends on A, so this is repeated.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::accel::{Hit, Ray};
@@ -12,7 +12,7 @@ use crate::camera::lens::camera_ray;
 use crate::cpu::render::render_first_hit;
 use crate::packed::{
     ESTIMATOR_DIRECT, FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, Frame,
-    MATERIAL_PHOTO_ALBEDO, NONE, PackedScene,
+    MATERIAL_PHOTO_ALBEDO, NONE, PHOTO_PATCHES, PackedScene,
 };
 use crate::scene::Photo;
 use crate::work::{Meter, Phase, Watcher};
@@ -35,18 +35,23 @@ const NORMAL_POWER: i32 = 16;
 struct Seen {
     /// Metres along the view axis; 0: nothing, or nothing whose albedo is wanted.
     depth_m: f32,
+    /// Anchor-relative.
+    position: Vec3,
     normal: Vec3,
     object: u32,
 }
 
-/// Fills `scene.photo_albedo` so that the converged Ir reproduces the photograph.
-pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo, watcher: &Watcher<'_>) {
+/// Fills `scene.photo_albedo` so that the converged Ir reproduces the photograph; the share of its pixels whose albedo had to be limited, because the
+/// proxy's light and the photograph differ by more than any surface does.
+pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo, watcher: &Watcher<'_>) -> f64 {
     let seen = first_surfaces(scene, |flags| flags & MATERIAL_PHOTO_ALBEDO != 0);
     scene.photo_albedo = unknown_albedo(scene, &seen);
     let pixels = seen.len();
     let scale = scene.frame.exposure_scale;
     let meter = Meter::begin(watcher, Phase::Albedo, ROUNDS as u64 * grid_points(scene));
+    let mut limited = 0;
     for _ in 0..ROUNDS {
+        limited = 0;
         let light = light_on_surfaces(scene, &seen, &meter);
         for ((entry, s), (light, ic)) in scene
             .photo_albedo
@@ -55,15 +60,18 @@ pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo, watcher: &W
             .zip(light.iter().zip(&photo.linear))
         {
             if s.depth_m > 0.0 {
-                for c in 0..3 {
-                    entry[c] = (ic[c] / (light[c] * scale).max(1e-12)).clamp(0.0, MAX_ALBEDO);
-                }
+                let wanted = Vec3::from(*ic) / (*light * scale).max(Vec3::splat(1e-12));
+                limited += usize::from(wanted.max_element() > MAX_ALBEDO || wanted == Vec3::ZERO);
+                let albedo = wanted.clamp(Vec3::ZERO, Vec3::splat(MAX_ALBEDO));
+                entry[..3].copy_from_slice(&albedo.to_array());
             }
         }
         let (of_pixels, of_objects) = scene.photo_albedo.split_at_mut(pixels);
-        set_medians(of_pixels, &seen, of_objects);
+        set_patches(scene.frame.width, of_pixels, &seen, of_objects);
     }
     meter.end();
+    let known = seen.iter().filter(|s| s.depth_m > 0.0).count();
+    limited as f64 / known.max(1) as f64
 }
 
 /// log2 of the factor that fits the real radiance to the photograph over the proxy: the median of Ic / Ir in luminance.
@@ -120,12 +128,14 @@ fn first_surfaces(scene: &PackedScene, wanted: impl Fn(u32) -> bool + Sync) -> V
             if hit.triangle == NONE || !wanted(material_flags(scene, hit)) {
                 return Seen {
                     depth_m: 0.0,
+                    position: Vec3::ZERO,
                     normal: Vec3::ZERO,
                     object: NONE,
                 };
             }
             Seen {
                 depth_m: hit.t * -ray.direction.dot(back),
+                position: ray.origin + ray.direction * hit.t,
                 normal: interpolated_normal(scene, hit),
                 object: scene.triangles[hit.triangle as usize].object,
             }
@@ -262,44 +272,77 @@ fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) 
 
 /// [`FIRST_ALBEDO`] for every pixel and every object.
 fn unknown_albedo(scene: &PackedScene, seen: &[Seen]) -> Vec<[f32; 4]> {
-    let first = |depth_m: f32| [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, depth_m];
+    let first = |w: f32| [FIRST_ALBEDO, FIRST_ALBEDO, FIRST_ALBEDO, w];
     let objects = (scene.triangles.iter())
         .filter(|t| t.object != NONE)
         .map(|t| t.object + 1)
         .max()
         .unwrap_or(0);
     let of_pixels = seen.iter().map(|s| first(s.depth_m));
-    of_pixels.chain((0..objects).map(|_| first(0.0))).collect()
+    let patches = (0..objects * PHOTO_PATCHES).flat_map(|_| [first(1.0), [0.0; 4]]);
+    of_pixels.chain(patches).collect()
 }
 
-/// Each object's median over the pixels that see it; one that no pixel sees takes that of all.
-fn set_medians(of_pixels: &[[f32; 4]], seen: &[Seen], of_objects: &mut [[f32; 4]]) {
-    let mut all = Vec::new();
-    let mut by_object = vec![Vec::new(); of_objects.len()];
-    for (albedo, s) in of_pixels.iter().zip(seen) {
+/// Pixels that see a part of an object.
+#[derive(Clone, Copy, Default)]
+struct Patch {
+    pixels: f64,
+    albedo: DVec3,
+    position: DVec3,
+    squared_position: f64,
+}
+
+impl Patch {
+    fn add(&mut self, albedo: &[f32; 4], position: Vec3) {
+        let position = position.as_dvec3();
+        self.pixels += 1.0;
+        self.albedo += Vec3::from_slice(&albedo[..3]).as_dvec3();
+        self.position += position;
+        self.squared_position += position.length_squared();
+    }
+
+    /// As in [`PackedScene::photo_albedo`].
+    fn records(&self) -> [[f32; 4]; 2] {
+        if self.pixels == 0.0 {
+            return [[0.0; 4]; 2];
+        }
+        let inv = 1.0 / self.pixels;
+        let (albedo, position) = (self.albedo * inv, self.position * inv);
+        let spread = (self.squared_position * inv - position.length_squared()).max(0.0);
+        [(albedo, self.pixels), (position, spread)]
+            .map(|(v, w)| v.as_vec3().extend(w as f32).to_array())
+    }
+}
+
+/// Means, all channels together so that no colour is invented, over a grid of [`PHOTO_PATCHES`] cells of the photograph; an object that no pixel
+/// sees takes what is seen of all.
+fn set_patches(width: u32, of_pixels: &[[f32; 4]], seen: &[Seen], of_objects: &mut [[f32; 4]]) {
+    let side = PHOTO_PATCHES.isqrt() as usize;
+    let width = width as usize;
+    let height = of_pixels.len() / width;
+    let per_object = PHOTO_PATCHES as usize;
+    let mut all = vec![Patch::default(); per_object];
+    let mut by_object = vec![Patch::default(); of_objects.len() / 2];
+    for (pixel, (albedo, s)) in of_pixels.iter().zip(seen).enumerate() {
         if s.depth_m > 0.0 {
-            all.push(*albedo);
-            by_object[s.object as usize].push(*albedo);
+            let cell = pixel / width * side / height * side + pixel % width * side / width;
+            all[cell].add(albedo, s.position);
+            by_object[s.object as usize * per_object + cell].add(albedo, s.position);
         }
     }
-    let of_all = median(&mut all);
-    for (entry, albedos) in of_objects.iter_mut().zip(&mut by_object) {
-        if let Some(median) = median(albedos).or(of_all) {
-            *entry = median;
-        }
+    if all.iter().all(|patch| patch.pixels == 0.0) {
+        return;
     }
-}
-
-/// Channel by channel.
-fn median(albedos: &mut [[f32; 4]]) -> Option<[f32; 4]> {
-    if albedos.is_empty() {
-        return None;
+    let records = of_objects.chunks_mut(2 * per_object);
+    for (records, patches) in records.zip(by_object.chunks(per_object)) {
+        let is_seen = patches.iter().any(|patch| patch.pixels > 0.0);
+        let patches = if is_seen { patches } else { &all };
+        let new = patches.iter().flat_map(Patch::records);
+        records
+            .iter_mut()
+            .zip(new)
+            .for_each(|(old, new)| *old = new);
     }
-    let middle = albedos.len() / 2;
-    Some(std::array::from_fn(|c| {
-        let by_channel = |a: &[f32; 4], b: &[f32; 4]| a[c].total_cmp(&b[c]);
-        albedos.select_nth_unstable_by(middle, by_channel).1[c]
-    }))
 }
 
 #[cfg(test)]

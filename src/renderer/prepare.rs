@@ -7,8 +7,11 @@ use crate::cpu;
 use crate::film::Film;
 use crate::gpu::Changed;
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO};
-use crate::scene::{BackendChoice, Exposure};
+use crate::scene::{BackendChoice, Composite, Exposure};
 use crate::work::{Meter, Phase, Watcher};
+
+/// Share of the proxy's pixels above which a limited albedo is told.
+const MOSTLY: f64 = 0.5;
 
 impl Renderer {
     /// Takes up the packed scene after an edit.
@@ -82,7 +85,19 @@ impl Renderer {
             }
         }
         if from_photo {
-            photo_albedo::estimate_photo_albedo(&mut core.packed, photo, watcher);
+            let limited = photo_albedo::estimate_photo_albedo(&mut core.packed, photo, watcher);
+            let is_additive = core.scene.settings.composite == Composite::Additive;
+            if limited > MOSTLY && is_additive {
+                let albedo = std::mem::take(&mut core.packed.photo_albedo);
+                let ev = photo_albedo::fit_exposure_ev(&mut core.packed, photo, watcher);
+                core.packed.photo_albedo = albedo;
+                let auto = ev.map_or(String::new(), |ev| format!(" (here {ev:.2})"));
+                core.notes.push(format!(
+                    "warning: {:.0}% of the proxy's albedo lies at its limit: the light does not fit the photograph, and shadows will be \
+                     wrong; set exposure_ev = \"auto\"{auto}, or composite = \"quotient\"",
+                    100.0 * limited
+                ));
+            }
         }
     }
 
@@ -98,8 +113,14 @@ impl Renderer {
         let core = &mut self.core;
         let without = core.options.without;
         without.apply_to_frame(&mut core.packed.frame);
+        core.packed.set_backdrop(&core.scene);
         cpu::pilot(&mut core.packed, &meter);
         without.apply_to_pixels(&mut core.packed.pixels);
+        let photons = core.packed.photons_per_ray > 0;
+        let note = core.packed.black_shadows(photons);
+        core.notes
+            .extend(note.filter(|note| !core.notes.contains(note)));
+        core.backdrop_share = cpu::backdrop_share(&mut core.packed);
         core.film = Film::new(
             core.film.width,
             core.film.height,

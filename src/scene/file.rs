@@ -9,7 +9,7 @@ use super::environment::read_environment;
 use super::error::{Result, SceneError, Source};
 use super::light::read_lights;
 use super::object::ObjectReader;
-use super::photo::read_photo;
+use super::photo::{read_backdrop, read_photo};
 use super::reader::Table;
 use super::sandbox::Sandbox;
 use super::settings::read_settings;
@@ -81,7 +81,7 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
     root.refuse_unknown(&[TABLES, Stages::TABLES].concat())?;
     let mut warnings = Vec::new();
     let (photo, exposure) = read_photo(&root, given.photo, &mut warnings)?;
-    let settings = read_settings(&root, exposure)?;
+    let settings = read_settings(&root, exposure, read_backdrop(&root)?)?;
     let stages = Stages::read(&root)?;
     let camera = read_camera(&root, photo.as_ref(), given.intrinsics.as_ref())?;
     let camera_path = read_camera_motion(&root)?;

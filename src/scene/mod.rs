@@ -309,6 +309,15 @@ pub enum Exposure {
     Auto,
 }
 
+/// What lies behind virtual objects where nothing is modelled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Backdrop {
+    Environment,
+    /// The photograph, where the camera shows it, on a plane across the view axis at this distance, metres, which may be infinite; `None`: that of
+    /// the proxy, in the median over the picture.
+    Photograph(Option<f64>),
+}
+
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     pub rays_per_pixel: u32,
@@ -322,5 +331,9 @@ pub struct Settings {
     pub sampler: SamplerKind,
     pub composite: Composite,
     pub backend: BackendChoice,
+    /// Facets of rough metal and glass send light to each other, so that none is lost; false: as glTF defines its lobes.
+    pub multiple_scattering: bool,
     pub exposure: Exposure,
+    /// Means nothing without a photograph.
+    pub backdrop: Backdrop,
 }

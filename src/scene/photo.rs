@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use super::error::Result;
-use super::reader::{Node, Table};
+use super::reader::{Choice, Node, Table};
 use super::srgb::{decode8, decode16};
-use super::{EncodedPhoto, Exposure, Photo};
+use super::{Backdrop, EncodedPhoto, Exposure, Photo};
 use crate::decode::{ImageFile, Pixels, decode_image, read_image};
 use crate::refusal::Refusal;
 
-const KEYS: &[&str] = &["image", "exposure_ev"];
+const KEYS: &[&str] = &["image", "exposure_ev", "backdrop", "backdrop_distance_m"];
 
 pub(super) fn read_photo(
     root: &Table,
@@ -28,6 +28,32 @@ pub(super) fn read_photo(
     };
     let exposure = table.optional("exposure_ev", |node| read_exposure(node, photo.is_some()))?;
     Ok((photo, exposure.unwrap_or(Exposure::Ev(0.0))))
+}
+
+/// What virtual objects show of what is not modelled.
+pub(super) fn read_backdrop(root: &Table) -> Result<Backdrop> {
+    let Some(table) = root.table("photo", "[photo]", KEYS)? else {
+        return Ok(Backdrop::Photograph(None));
+    };
+    let distance_m = table.optional("backdrop_distance_m", Node::positive_or_infinite)?;
+    let choice = table.optional("backdrop", |node| node.choice::<BackdropChoice>())?;
+    Ok(match choice.unwrap_or(BackdropChoice::Photograph) {
+        BackdropChoice::Environment => Backdrop::Environment,
+        BackdropChoice::Photograph => Backdrop::Photograph(distance_m),
+    })
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum BackdropChoice {
+    Environment,
+    Photograph,
+}
+
+impl Choice for BackdropChoice {
+    const CHOICES: &'static [(&'static str, Self)] = &[
+        ("photograph", Self::Photograph),
+        ("environment", Self::Environment),
+    ];
 }
 
 fn read_exposure(node: &Node, has_photo: bool) -> Result<Exposure> {

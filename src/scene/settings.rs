@@ -2,7 +2,7 @@
 
 use super::error::Result;
 use super::reader::{Choice, Node, Table};
-use super::{BackendChoice, Composite, Estimator, Exposure, SamplerKind, Settings, Side};
+use super::{Backdrop, BackendChoice, Composite, Estimator, Exposure, SamplerKind, Settings, Side};
 
 impl Choice for Side {
     const CHOICES: &'static [(&'static str, Self)] =
@@ -44,6 +44,8 @@ impl Default for Settings {
             composite: Composite::Additive,
             backend: BackendChoice::Auto,
             exposure: Exposure::Ev(0.0),
+            backdrop: Backdrop::Photograph(None),
+            multiple_scattering: true,
         }
     }
 }
@@ -89,17 +91,26 @@ const KEYS: &[&str] = &[
     "sampler",
     "composite",
     "backend",
+    "multiple_scattering",
 ];
 
-/// `[render]`; the exposure stands in `[photo]`.
-pub(super) fn read_settings(root: &Table, exposure: Exposure) -> Result<Settings> {
+/// `[render]`; exposure and backdrop stand in `[photo]`.
+pub(super) fn read_settings(
+    root: &Table,
+    exposure: Exposure,
+    backdrop: Backdrop,
+) -> Result<Settings> {
     let mut settings = Settings {
         exposure,
+        backdrop,
         ..Settings::default()
     };
     if let Some(table) = root.table("render", "[render]", KEYS)? {
         if let Some(clamp) = table.optional("clamp_indirect", Node::positive_or_infinite)? {
             settings.clamp_indirect = clamp as f32;
+        }
+        if let Some(wanted) = table.optional("multiple_scattering", Node::boolean)? {
+            settings.multiple_scattering = wanted;
         }
         settings.apply(&Overrides {
             rays_per_pixel: table.optional("rays_per_pixel", |node| {

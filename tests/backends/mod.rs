@@ -36,6 +36,7 @@ each_case! {
     alpha_under_lights_without_size,
     smooth_glass_in_the_sun,
     rough_and_thin_glass,
+    windows_and_fog,
     clearcoat,
     virtual_lights,
     glowing_real_wall,

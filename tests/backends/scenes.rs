@@ -196,6 +196,30 @@ edge_u = [0.6, 0, 0.2]
 edge_v = [0, 0.6, 0]
 material = { base_color = [0.8, 0.9, 0.7], transmission = 1.0, roughness = 0.0, thin_walled = true }
 ";
+/// A real thin wall, a body of index 1, and a pane whose tint and clearness a picture gives.
+const WINDOW: &str = "
+[[real]]
+shape = \"quad\"
+corner = [-0.9, 0, 0.5]
+edge_u = [0.7, 0, 0.1]
+edge_v = [0, 0.6, 0]
+material = { base_color = [0.7, 0.9, 0.8], transmission = 1.0, roughness = 0.0, thin_walled = true }
+";
+const FOG: &str = "
+[[virtual]]
+shape = \"box\"
+size = [0.4, 0.3, 0.3]
+translation = [0.3, 0.15, 0.4]
+material = { transmission = 1.0, roughness = 0.5, ior = 1.0, attenuation_color = [0.4, 0.8, 0.6], attenuation_distance_m = 0.3 }
+";
+const TEXTURED_PANE: &str = "
+[[virtual]]
+shape = \"quad\"
+corner = [-0.6, 0.5, -0.3]
+edge_u = [1.2, 0, 0]
+edge_v = [0, 0.1, 0.8]
+material = { base_color = [0.9, 0.7, 0.9], transmission = 0.9, roughness = 0.0, thin_walled = true, clearcoat = 0.5, clearcoat_roughness = 0.3 }
+";
 const VEIL: &str = "
 [[real]]
 shape = \"quad\"
@@ -362,6 +386,25 @@ pub const CASES: &[Case] = &[
             QUAD,
         ],
         settings: "max_bounces = 6\nsampler = \"cmj\"",
+        all_planes: true,
+    },
+    Case {
+        name: "windows_and_fog",
+        parts: &[
+            CAMERA,
+            DISC_LENS,
+            SUNNY_SKY,
+            MATT_FLOOR,
+            WINDOW,
+            FOG,
+            TEXTURED_PANE,
+            GLASS_BALL,
+            MATT_BALL,
+            QUAD,
+            POINTS,
+            VIRTUAL_POINTS,
+        ],
+        settings: "max_bounces = 4",
         all_planes: true,
     },
     Case {

@@ -44,14 +44,8 @@ fn the_ramps_of_spheres_fall() {
     assert!(black.iter().all(|x| *x > 0.01 && *x < 0.05), "{black:?}");
     let [white, .., black] = metals;
     assert!(black.iter().all(|x| *x < 0.02), "{black:?}");
-    // A smooth white metal mirrors the white sky; single scattering loses more the rougher it is.
-    assert!((white[0] - 1.0).abs() < 0.01, "{white:?}");
-    assert!(
-        white.windows(2).all(|pair| pair[1] < pair[0] + 0.04),
-        "{white:?}"
-    );
-    // With alpha 1 and seen at right angles it keeps 1 - ln 2 = 0.307; the spheres are averaged up to half their radius.
-    assert!(white[10] > 0.3 && white[10] < 0.42, "{white:?}");
+    // A white metal mirrors the white sky, and its facets lose nothing, however rough they are.
+    assert!(white.iter().all(|x| (x - 1.0).abs() < 0.02), "{white:?}");
 }
 
 /// With the light of its lamps and without; in the dark only they are seen.

@@ -295,6 +295,43 @@ fn virtual_glass(backend: BackendChoice) {
     }
 }
 
+/// Panes of both worlds, one behind the other, tinted, and a body of index 1.
+fn panes(backend: BackendChoice) {
+    let pane = |side: &str, z: f64, tint: &str| {
+        format!(
+            r#"
+[[{side}]]
+shape = "quad"
+corner = [-0.8, 0, {z}]
+edge_u = [1.2, 0, 0.2]
+edge_v = [0, 0.8, -0.3]
+material = {{ base_color = {tint}, transmission = 1.0, roughness = 0.0, thin_walled = true }}
+"#
+        )
+    };
+    let fog = r#"
+[[virtual]]
+shape = "box"
+size = [0.4, 0.5, 0.4]
+translation = [0.5, 0.25, 0.1]
+material = { transmission = 1.0, ior = 1.0, attenuation_color = [0.4, 0.8, 0.6], attenuation_distance_m = 0.3 }
+"#;
+    let (real, added) = (
+        pane("real", 0.5, "[0.7, 0.9, 0.8]"),
+        pane("virtual", 0.3, "[0.9, 0.4, 0.6]"),
+    );
+    let glow = LAMP.replace("radiance", "side = \"virtual\"\nradiance");
+    for (name, world) in [
+        ("added panes", format!("{added}{fog}")),
+        ("panes of both worlds", format!("{real}{added}{RED_BOX}")),
+    ] {
+        let scene = room(&format!("{TABLE}{WALL}{LAMP}{SKY}{world}"));
+        agree(name, &scene, &[1, 2, 4], backend);
+    }
+    let scene = room(&format!("{TABLE}{WALL}{glow}{real}{added}{RED_BOX}"));
+    agree("a virtual lamp past panes", &scene, &[1, 2, 4], backend);
+}
+
 fn real_glass(backend: BackendChoice) {
     for (name, material) in [
         ("real smooth glass", "roughness = 0.0, transmission = 1.0"),
@@ -355,6 +392,7 @@ on_the_cpu!(
     tilted_normals,
     virtual_glass,
     real_glass,
+    panes,
     emissive_meshes,
     control_notices_an_albedo,
 );

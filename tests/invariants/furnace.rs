@@ -23,6 +23,7 @@ radiance = [1, 1, 1]
 [render]
 rays_per_pixel = 64
 max_bounces = 64
+multiple_scattering = false
 {objects}"#
     ));
     scene.photo = Some(constant_photo(scene.camera.width, scene.camera.height, 1.0));
@@ -200,7 +201,45 @@ fn rough_surfaces_show_their_single_scattering_albedo(backend: BackendChoice) {
     );
 }
 
+/// With the light that facets send to each other rough metal and glass lose nothing, at any roughness and angle.
+fn rough_white_objects_lose_nothing(backend: BackendChoice) {
+    let mut lost = 0.0_f64;
+    for material in ["metallic = 1.0", "transmission = 1.0, thin_walled = true"] {
+        for roughness in [0.1, 0.35, 0.6, 0.8, 1.0] {
+            for angle_deg in [0.0, 50.0, 80.0] {
+                let material = format!("{material}, roughness = {roughness:?}");
+                let mut scene = tilted_quad(angle_deg, &material);
+                let (single, _) = shown_albedo(&scene, backend);
+                scene.settings.multiple_scattering = true;
+                let (shown, error) = shown_albedo(&scene, backend);
+                println!("furnace, {material}, {angle_deg} deg: {shown:.5}, single {single:.5}");
+                assert!(
+                    (shown - 1.0).abs() < 0.01 + 4.0 * error,
+                    "{material} {angle_deg}: {shown}"
+                );
+                lost = lost.max(1.0 - single);
+            }
+        }
+    }
+    assert!(lost > 0.5, "control: single scattering loses light, {lost}");
+    for ior in [1.2, 1.5, 2.4] {
+        for roughness in [0.2, 0.6, 1.0] {
+            let material = format!("transmission = 1.0, ior = {ior:?}, roughness = {roughness:?}");
+            let mut scene = furnace(&ball(&material));
+            scene.settings.multiple_scattering = true;
+            let (_, mean) = errors(&scene, backend);
+            println!("furnace, {material}: mean {mean:+.1e}");
+            // Of the picture, a quarter of which is glass.
+            assert!(mean.abs() < 0.0025, "{material}: {mean}");
+            scene.settings.multiple_scattering = false;
+            let (_, single) = errors(&scene, backend);
+            assert!(roughness < 0.5 || single < -0.0025, "control: {single}");
+        }
+    }
+}
+
 on_the_cpu!(
+    rough_white_objects_lose_nothing,
     smooth_white_objects_vanish,
     white_lambertian_objects_vanish,
     rough_surfaces_show_their_single_scattering_albedo,

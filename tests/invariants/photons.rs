@@ -302,7 +302,46 @@ material = { base_color = [1, 1, 1], metallic = 1.0, roughness = 0.0 }
     );
 }
 
+/// A pane above the ball lets that much of the sun through, and no more changes.
+fn the_sun_through_a_pane_and_a_glass_ball(backend: BackendChoice) {
+    let ball = format!(
+        r#"
+[[virtual]]
+shape = "sphere"
+segments = 64
+scale = {RADIUS}
+translation = [{}, {}, {}]
+material = {{ base_color = [1, 1, 1], transmission = 1.0, roughness = 0.0, ior = 1.5 }}
+"#,
+        CENTRE.x, CENTRE.y, CENTRE.z
+    );
+    let pane = r#"
+[[virtual]]
+shape = "quad"
+corner = [-1, 1.2, 1]
+edge_u = [2, 0, 0]
+edge_v = [0, 0, -2.5]
+material = { base_color = [0.8, 0.8, 0.8], transmission = 1.0, roughness = 0.0, thin_walled = true, ior = 1.5 }
+"#;
+    let bare = brought(&sunny_floor([0.0, -1.0, 0.0], &ball, 3), backend);
+    let behind = brought(
+        &sunny_floor([0.0, -1.0, 0.0], &format!("{ball}{pane}"), 3),
+        backend,
+    );
+    let once = (0.5_f64 / 2.5).powi(2);
+    let passed = 0.8 * (1.0 - 2.0 * once / (1.0 + once));
+    let expected: Vec<f64> = (0..bare[0].len())
+        .map(|i| passed * mean(&bare.iter().map(|means| means[i]).collect::<Vec<_>>()))
+        .collect();
+    let total: f64 = expected.iter().sum();
+    let found: Vec<f64> = behind.iter().map(|means| means.iter().sum()).collect();
+    let found = mean(&found);
+    assert!((found / total - 1.0).abs() < 0.02, "{found} {total}");
+    assert!((found / total * passed - 1.0).abs() > 0.1, "control");
+}
+
 on_the_cpu!(
+    the_sun_through_a_pane_and_a_glass_ball,
     the_sun_through_a_glass_ball_is_that_of_a_brute_force,
     the_sun_off_a_mirror_cylinder_is_the_closed_form,
 );

@@ -450,6 +450,7 @@ on_the_cpu!(
     the_last_vertex_saves_rays,
     photons_bring_what_the_eye_finds,
     photons_save_error,
+    the_guide_saves_error,
     adaptive_sampling_saves_rays,
     stopping_at_the_cameras_noise_saves_rays,
 );

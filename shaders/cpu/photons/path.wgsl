@@ -10,11 +10,12 @@ import package::camera::shutter::camera_pose;
 import package::camera::splat::{exposure_weight, lens_connect};
 import package::cpu::estimator::virtual_is_nearer;
 import package::cpu::photons::emission::emit;
+import package::cpu::panes::{PANE_SETS, open_share, transmittance};
 import package::cpu::request::answer;
-import package::cpu::state::{FAR, PathState, REQUEST_CLOSEST_MIXED, REQUEST_SHADOW_MIXED, path_state};
-import package::cpu::vertex::{EMITS_ONLY, max_element, medium_along, stand_at, transmittance};
+import package::cpu::state::{FAR, PANES, PathState, REQUEST_CLOSEST_MIXED, REQUEST_SHADOW_MIXED, path_state};
+import package::cpu::vertex::{EMITS_ONLY, max_element, medium_along, stand_at};
 import package::gpu::photons::add_splat;
-import package::material::bsdf::{bsdf_eval, bsdf_index_ratio, bsdf_is_polished, bsdf_passes_straight, bsdf_sample};
+import package::material::bsdf::{bsdf_eval, bsdf_index_ratio, bsdf_is_polished, bsdf_passes_straight, bsdf_sample, bsdf_straight};
 import package::material::scatter::BsdfSample;
 import package::material::surface::{Surface, surface_at};
 
@@ -51,7 +52,7 @@ fn trace_photon(number: PhotonNumber, thread: u32) -> PathState {
         let met = next_vertex(&photon);
         if !met.yes { break; }
         if photon.chained && !bsdf_is_polished(met.s) { see(&photon, met.s, met.wi); }
-        if photon.st.ray.depth >= frame.max_bounces || !scatter(&photon, met.s, met.wi) { break; }
+        if !scatter(&photon, met.s, met.wi) { break; }
     }
     return photon.st;
 }
@@ -62,6 +63,11 @@ fn draw(photon: ptr<function, Photon>, set_id: u32) -> SampleSet {
 
 fn vertex_set(photon: ptr<function, Photon>, purpose: u32) -> SampleSet {
     return draw(photon, FIRST_VERTEX_SET + (*photon).st.ray.depth * SETS_PER_VERTEX + purpose);
+}
+
+fn pane_set(photon: ptr<function, Photon>) -> SampleSet {
+    let set_id = hash_combine((*photon).st.vertex_hit.triangle, (*photon).st.ray.depth) | PANE_SETS;
+    return draw(photon, set_id);
 }
 
 fn begin(number: PhotonNumber, thread: u32) -> Photon {
@@ -111,7 +117,12 @@ fn next_vertex(photon: ptr<function, Photon>) -> Met {
     }
     met.wi = -st.ray.direction;
     stand_at(&st, met.s, hit.t);
-    met.yes = !(st.ray.depth == 1u && (*photon).distant) || is_open(&st, met.wi, FAR, (*photon).thread);
+    met.yes = true;
+    if (*photon).distant {
+        (*photon).distant = false;
+        (*photon).flux *= open_towards(&st, met.wi, FAR, (*photon).thread);
+        met.yes = any((*photon).flux != vec3<f32>(0.0));
+    }
     (*photon).st = st;
     return met;
 }
@@ -120,12 +131,12 @@ fn leaves_volume(s: Surface) -> bool {
     return !s.front && s.transmission > 0.0 && (s.flags & MATERIAL_THIN_WALLED) == 0u;
 }
 
-fn is_open(st: ptr<function, PathState>, direction: vec3<f32>, distance: f32, thread: u32) -> bool {
+fn open_towards(st: ptr<function, PathState>, direction: vec3<f32>, distance: f32, thread: u32) -> vec3<f32> {
     (*st).ray.direction = direction;
     (*st).ray.t_max = distance;
     (*st).ray.request = REQUEST_SHADOW_MIXED;
     answer(st, thread);
-    return (*st).hits.in_virtual.triangle == NONE && (*st).hits.in_real.triangle == NONE;
+    return open_share((*st).hits.in_virtual) * open_share((*st).hits.in_real);
 }
 
 fn see(photon: ptr<function, Photon>, s: Surface, wi: vec3<f32>) {
@@ -141,13 +152,15 @@ fn see(photon: ptr<function, Photon>, s: Surface, wi: vec3<f32>) {
     var st = (*photon).st;
     let scattered = scattered_to(&st, lens.direction, wi);
     if max_element(scattered.xyz) <= 0.0 { return; }
-    let open = is_open(&st, lens.direction, lens.distance, (*photon).thread);
+    let open = open_towards(&st, lens.direction, lens.distance, (*photon).thread);
     (*photon).st = st;
-    if !open { return; }
+    // What the camera sees through a real pane is the eye's.
+    if all(open == vec3<f32>(0.0)) || st.hits.in_real.triangle == PANES { return; }
     let pixels = f32(frame.width * frame.height);
     let geometry = scattered.w / (lens.distance * lens.distance) * lens.importance;
     let scale = geometry * (exposed * frame.exposure_scale / pixels);
-    add_splat(lens.pixel, st.ray.side == SIDE_VIRTUAL, (*photon).flux * scattered.xyz * scale);
+    let is_virtual = st.ray.side == SIDE_VIRTUAL || st.hits.in_virtual.triangle == PANES;
+    add_splat(lens.pixel, is_virtual, (*photon).flux * scattered.xyz * open * scale);
 }
 
 // xyz: radiance, w: the cosine.
@@ -160,10 +173,15 @@ fn scattered_to(st: ptr<function, PathState>, wo: vec3<f32>, wi: vec3<f32>) -> v
 }
 
 fn scatter(photon: ptr<function, Photon>, s: Surface, wi: vec3<f32>) -> bool {
-    let u = vertex_set(photon, 0u);
+    let at_pane = any(bsdf_straight(s, wi) != vec3<f32>(0.0));
+    let is_last = (*photon).st.ray.depth >= frame.max_bounces;
+    if is_last && !at_pane { return false; }
+    var u = vertex_set(photon, 0u);
+    if at_pane { u = pane_set(photon); }
     let b = bsdf_sample(s, wi, vec3<f32>(third(u), pair(u)));
     if !b.valid { return false; }
     let straight = b.delta && b.transmitted && bsdf_passes_straight(s);
+    if is_last && !straight { return false; }
     if !(*photon).landed && !straight {
         if b.delta || bsdf_is_polished(s) {
             if (*photon).st.ray.side == SIDE_REAL { return false; }
@@ -185,6 +203,7 @@ fn scatter(photon: ptr<function, Photon>, s: Surface, wi: vec3<f32>) -> bool {
     var st = (*photon).st;
     (*photon).st.path.medium = medium_along(&st, s, b.wi);
     (*photon).st.ray.direction = b.wi;
+    if straight { (*photon).st.ray.depth -= 1u; }
     return any((*photon).flux != vec3<f32>(0.0));
 }
 

@@ -161,7 +161,10 @@ pub fn cases() -> Vec<Case> {
             quick_settings: &[1e-4],
             control_at: 1.0,
             run: shortcuts::at_the_lens,
-            ..photons("photons at the lens", "a wall so far from the lens plane, lit by a mirror")
+            ..photons(
+                "photons at the lens",
+                "a wall so far from the lens plane, lit by a mirror",
+            )
         },
         Case {
             unit: "m",
@@ -178,7 +181,10 @@ pub fn cases() -> Vec<Case> {
             control_at: 10.0,
             bound: 0.5,
             run: shortcuts::few_pilot_photons,
-            ..photons("few pilot photons", "the same, the pilot seeing about as many photons")
+            ..photons(
+                "few pilot photons",
+                "the same, the pilot seeing about as many photons",
+            )
         },
         Case {
             unit: "x",
@@ -186,7 +192,10 @@ pub fn cases() -> Vec<Case> {
             quick_settings: &[1e4],
             control_at: 10.0,
             run: shortcuts::apart,
-            ..shared("sharing across depths", "pixels of a tile so many times nearer than others")
+            ..shared(
+                "sharing across depths",
+                "pixels of a tile so many times nearer than others",
+            )
         },
         Case {
             unit: "rad",
@@ -194,7 +203,10 @@ pub fn cases() -> Vec<Case> {
             quick_settings: &[1e-3],
             control_at: 1e-2,
             run: shortcuts::grazing_links,
-            ..shared("grazing links", "a ball over the floor, seen from it at this angle")
+            ..shared(
+                "grazing links",
+                "a ball over the floor, seen from it at this angle",
+            )
         },
         Case {
             settings: &[0.0, 1e-4],

@@ -30,7 +30,13 @@ fn lit_from_behind(mirror_half: f64, brighter: f64, rays_per_pixel: u32) -> Scen
         camera,
         rays_per_pixel,
         vec![
-            object(Side::Real, "wall", upright(-1.0, 3.0), wall, DMat4::IDENTITY),
+            object(
+                Side::Real,
+                "wall",
+                upright(-1.0, 3.0),
+                wall,
+                DMat4::IDENTITY,
+            ),
             object(
                 Side::Virtual,
                 "mirror",
@@ -111,7 +117,13 @@ fn shows_strip(column: u32) -> bool {
 
 /// A floor seen from above through strips near the lens, under an even sky and a black ball aside, as high over the floor as given.
 fn floor_and_strips(strip_depth_m: f64, ball: DVec3, radius: f64, rays_per_pixel: u32) -> Scene {
-    let camera = camera([SIDE; 2], FOCAL_PX, DVec3::Y * EYE_M, DVec3::ZERO, -DVec3::Z);
+    let camera = camera(
+        [SIDE; 2],
+        FOCAL_PX,
+        DVec3::Y * EYE_M,
+        DVec3::ZERO,
+        -DVec3::Z,
+    );
     let gray = matt([ALBEDO as f32; 3]);
     let real = |name, primitive| object(Side::Real, name, primitive, gray.clone(), DMat4::IDENTITY);
     let at = |column: u32| (f64::from(column) - 0.5 * f64::from(SIDE)) / FOCAL_PX * strip_depth_m;
@@ -119,7 +131,10 @@ fn floor_and_strips(strip_depth_m: f64, ball: DVec3, radius: f64, rays_per_pixel
     for first in (2..SIDE).step_by(4) {
         let corner = DVec3::new(at(first), EYE_M - strip_depth_m, strip_depth_m);
         let across = DVec3::X * (at(first + 2) - at(first));
-        objects.push(real("strip", quad(corner, across, DVec3::Z * -2.0 * strip_depth_m)));
+        objects.push(real(
+            "strip",
+            quad(corner, across, DVec3::Z * -2.0 * strip_depth_m),
+        ));
     }
     let place = DMat4::from_translation(ball) * DMat4::from_scale(DVec3::splat(radius));
     objects.push(object(
@@ -169,7 +184,11 @@ fn taken(
     }
     let error = |of: usize| (is[of] / should[of] - 1.0).abs();
     Ok(Measured {
-        figure: if error(0).is_nan() { f64::NAN } else { error(0).max(error(1)) },
+        figure: if error(0).is_nan() {
+            f64::NAN
+        } else {
+            error(0).max(error(1))
+        },
         ..Measured::of_film(&shown.film)
     })
 }

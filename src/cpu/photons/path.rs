@@ -10,13 +10,14 @@ use crate::camera::sampler::{SampleKey, SampleSet, sample_set};
 use crate::camera::shutter::{camera_pose, camera_pose_at};
 use crate::camera::splat::{exposure_weight, lens_connect};
 use crate::cpu::estimator::virtual_is_nearer;
+use crate::cpu::panes::{PANE_SETS, open_share, transmittance};
 use crate::cpu::request::answer;
 use crate::cpu::state::*;
-use crate::cpu::vertex::{EMITS_ONLY, medium_along, stand_at, transmittance};
+use crate::cpu::vertex::{EMITS_ONLY, medium_along, stand_at};
 use crate::film::Splat;
 use crate::material::{
     BsdfSample, Surface, bsdf_eval, bsdf_index_ratio, bsdf_is_polished, bsdf_passes_straight,
-    bsdf_sample, surface_at,
+    bsdf_sample, bsdf_straight, surface_at,
 };
 use crate::math::{dot3, hash_combine};
 use crate::packed::{
@@ -85,7 +86,7 @@ pub fn trace_photon(
         {
             splat(seen);
         }
-        if photon.st.ray.depth >= scene.frame.max_bounces || !scatter(scene, &mut photon, &s, wi) {
+        if !scatter(scene, &mut photon, &s, wi) {
             break;
         }
     }
@@ -127,6 +128,13 @@ fn vertex_set(photon: &Photon, purpose: u32) -> SampleSet {
         photon,
         FIRST_VERTEX_SET + photon.st.ray.depth * SETS_PER_VERTEX + purpose,
     )
+}
+
+/// As [`crate::cpu::panes::draw_at_pane`].
+fn pane_set(photon: &Photon) -> SampleSet {
+    let st = &photon.st;
+    let set_id = hash_combine(st.vertex_hit.triangle, st.ray.depth) | PANE_SETS;
+    draw(photon, set_id)
 }
 
 fn begin(scene: &PackedScene, number: PhotonNumber) -> Photon {
@@ -191,8 +199,12 @@ fn next_vertex(scene: &PackedScene, photon: &mut Photon) -> Option<(Surface, Vec
     photon.flux *= transmittance(scene, st.path.medium, hit.t);
     let wi = -st.ray.direction;
     stand_at(scene, st, &s, hit.t);
-    if st.ray.depth == 1 && photon.distant && !is_open(scene, st, wi, f32::INFINITY) {
-        return None;
+    if photon.distant {
+        photon.distant = false;
+        photon.flux *= open_towards(scene, st, wi, f32::INFINITY);
+        if photon.flux == Vec3::ZERO {
+            return None;
+        }
     }
     Some((s, wi))
 }
@@ -201,13 +213,13 @@ fn leaves_volume(s: &Surface) -> bool {
     !s.front && s.transmission > 0.0 && s.flags & MATERIAL_THIN_WALLED == 0
 }
 
-/// Whether nothing stands in the way from the vertex.
-fn is_open(scene: &PackedScene, st: &mut PathState, direction: Vec3, distance: f32) -> bool {
+/// Share of the light that comes to the vertex past what stands in the way.
+fn open_towards(scene: &PackedScene, st: &mut PathState, direction: Vec3, distance: f32) -> Vec3 {
     st.ray.direction = direction;
     st.ray.t_max = distance;
     st.ray.request = REQUEST_SHADOW_MIXED;
     answer(scene, st);
-    st.hits.in_virtual.triangle == NONE && st.hits.in_real.triangle == NONE
+    open_share(st.hits.in_virtual) * open_share(st.hits.in_real)
 }
 
 /// What the lens sees of the photon at a vertex, if anything.
@@ -231,7 +243,13 @@ fn see(scene: &PackedScene, photon: &mut Photon, s: &Surface, wi: Vec3) -> Optio
     if scattered.max_element() <= 0.0 {
         return None;
     }
-    if !is_open(scene, &mut photon.st, lens.direction, lens.distance) {
+    let open = open_towards(scene, &mut photon.st, lens.direction, lens.distance);
+    let Hits {
+        in_real,
+        in_virtual,
+    } = photon.st.hits;
+    // What the camera sees through a real pane is the eye's.
+    if open == Vec3::ZERO || in_real.triangle == PANES {
         return None;
     }
     let pixels = (frame.width * frame.height) as f32;
@@ -239,8 +257,8 @@ fn see(scene: &PackedScene, photon: &mut Photon, s: &Surface, wi: Vec3) -> Optio
     let scale = geometry * (exposed * frame.exposure_scale / pixels);
     Some(Splat {
         pixel: lens.pixel,
-        is_virtual: photon.st.ray.side == SIDE_VIRTUAL,
-        value: photon.flux * scattered * scale,
+        is_virtual: photon.st.ray.side == SIDE_VIRTUAL || in_virtual.triangle == PANES,
+        value: photon.flux * scattered * open * scale,
     })
 }
 
@@ -258,13 +276,25 @@ fn scattered_to(scene: &PackedScene, st: &PathState, wo: Vec3, wi: Vec3) -> (Vec
 
 /// The next direction; false where the photon ends.
 fn scatter(scene: &PackedScene, photon: &mut Photon, s: &Surface, wi: Vec3) -> bool {
-    let u = vertex_set(photon, 0);
+    let at_pane = bsdf_straight(s, wi) != Vec3::ZERO;
+    let is_last = photon.st.ray.depth >= scene.frame.max_bounces;
+    if is_last && !at_pane {
+        return false;
+    }
+    let u = if at_pane {
+        pane_set(photon)
+    } else {
+        vertex_set(photon, 0)
+    };
     let [x, y] = u.pair();
     let b = bsdf_sample(s, wi, [u.third(), x, y]);
     if !b.valid {
         return false;
     }
     let straight = b.delta && b.transmitted && bsdf_passes_straight(s);
+    if is_last && !straight {
+        return false;
+    }
     if !photon.landed && !straight {
         if b.delta || bsdf_is_polished(s) {
             // A smooth real surface on the way: the eye's paths bring that.
@@ -292,6 +322,10 @@ fn scatter(scene: &PackedScene, photon: &mut Photon, s: &Surface, wi: Vec3) -> b
     }
     photon.st.path.medium = medium_along(&photon.st, s, b.wi);
     photon.st.ray.direction = b.wi;
+    if straight {
+        // As if there were no vertex.
+        photon.st.ray.depth -= 1;
+    }
     photon.flux != Vec3::ZERO
 }
 

@@ -16,6 +16,7 @@ const CAPTURE: u32 = 16;
 /// The largest variants: `direct`, with second vertices shared and without, and `paper`.
 const SHARING: Features = Features {
     paper: false,
+    panes: false,
     ..Features::ALL
 };
 const DIRECT: Features = Features {

@@ -121,8 +121,6 @@ const TRACES: &[Trace] = &[
         feature: "alpha",
         kernel: "kernel_trace",
         with: &[
-            "gpu_buffers__materials",
-            "gpu_buffers__vertices",
             "fn cpu_request__meets",
             "fn material_surface__surface_alpha",
         ],
@@ -263,7 +261,6 @@ const TRACES: &[Trace] = &[
         feature: "photons",
         with: &[
             "fn cpu_contribution__left_to_photons",
-            "fn cpu_contribution__events_after",
             "fn cpu_vertex__light_left_to_eye",
         ],
         ..ADVANCE
@@ -284,9 +281,43 @@ const TRACES: &[Trace] = &[
         ..ADVANCE
     },
     Trace {
+        feature: "panes",
+        with: &[
+            "fn cpu_panes__pass_straight",
+            "fn cpu_panes__is_pane",
+            "cpu_state__path_passed_m",
+        ],
+        beside: &["transmission", "rough_specular"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "panes",
+        kernel: "kernel_trace",
+        with: &["fn cpu_panes__pass", "fn material_bsdf__bsdf_straight"],
+        beside: &["transmission", "rough_specular"],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "backdrop",
+        with: &[
+            "fn light_backdrop__backdrop_radiance",
+            "fn cpu_contribution__from_lens_after",
+            "gpu_buffers__backdrop",
+        ],
+        ..ADVANCE
+    },
+    Trace {
+        feature: "facets",
+        with: &[
+            "fn material_facets__kept_by_facets",
+            "gpu_buffers__facet_tables",
+        ],
+        ..ADVANCE
+    },
+    Trace {
         feature: "rough_specular",
         with: &[
-            "fn material_ggx__",
+            "fn material_ggx__ggx_reflect",
             "fn material_lobes__lobes_sample",
             "fn material_lobes__eval_reflection",
             "fn material_normal__valid_shading_normal",

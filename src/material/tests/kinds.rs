@@ -32,6 +32,8 @@ pub fn plain_surface() -> Surface {
         material: 0,
         light: NONE,
         object: 0,
+        metal_gain: 0.0,
+        glass_gain: 1.0,
     }
 }
 
@@ -66,7 +68,7 @@ pub const READ_SURFACE: &str = "
 fn read_surface() -> Surface {
     return Surface(input_vec3(6u), 0.0, input_vec3(9u), input_vec3(12u), input_vec3(15u), input_vec3(18u),
         input_f32(21u), input_f32(22u), input_f32(23u), input_f32(24u), input_vec3(25u), input_f32(28u), input_f32(29u),
-        input_f32(30u), vec3<f32>(0.0), 1.0, input(31u) != 0u, input(32u), 0u, NONE, 0u);
+        input_f32(30u), vec3<f32>(0.0), 1.0, input(31u) != 0u, input(32u), 0u, NONE, 0u, 0.0, 1.0);
 }
 ";
 

@@ -4,6 +4,7 @@ mod energy;
 mod fresnel;
 mod kinds;
 mod surface;
+mod terminator;
 mod texture;
 mod twins;
 
@@ -68,6 +69,7 @@ pub fn plain_material() -> Material {
         specular: 1.0,
         specular_color: [1.0; 3],
         clearcoat_normal_scale: 1.0,
+        facet_table: NONE,
         base_color_texture: NONE,
         metallic_roughness_texture: NONE,
         normal_texture: NONE,

@@ -20,6 +20,8 @@ impl Scene {
             max_bounces,
             clamp_indirect,
             exposure,
+            backdrop,
+            multiple_scattering,
             rays_per_pixel: _,
             seed: _,
             estimator: _,
@@ -43,7 +45,11 @@ impl Scene {
             settings: _,
             warnings: _,
         } = self;
-        (max_bounces, (clamp_indirect, exposure)).add_to(&mut hash);
+        (
+            max_bounces,
+            (clamp_indirect, (exposure, (backdrop, multiple_scattering))),
+        )
+            .add_to(&mut hash);
         (photo, (camera, lens)).add_to(&mut hash);
         (environment, lights).add_to(&mut hash);
         (objects, (shutter, camera_path)).add_to(&mut hash);

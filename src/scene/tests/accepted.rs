@@ -39,7 +39,9 @@ fn the_shortest_scene_has_the_stated_defaults() {
             sampler: SamplerKind::Sobol,
             composite: Composite::Additive,
             backend: BackendChoice::Auto,
+            multiple_scattering: true,
             exposure: Exposure::Ev(0.0),
+            backdrop: Backdrop::Photograph(None),
         }
     );
 }
@@ -194,7 +196,9 @@ fn settings_and_flags() {
         sampler: SamplerKind::Jittered,
         composite: Composite::Quotient,
         backend: BackendChoice::Cpu,
+        multiple_scattering: true,
         exposure: Exposure::Ev(-1.0),
+        backdrop: Backdrop::Photograph(None),
     };
     assert_eq!(settings, from_file);
     settings.apply(&Overrides::default());
