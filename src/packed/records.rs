@@ -205,6 +205,11 @@ shared! {
         pub axis_u: [f32; 4],
         /// edge_v, or third minus first vertex; w: cos of the spot's outer angle.
         pub axis_v: [f32; 4],
+        /// Quads and triangles: unit axis_u and axis_v; w: their lengths, metres.
+        pub unit_u: [f32; 4],
+        pub unit_v: [f32; 4],
+        /// Quads and triangles: axis_u x axis_v; w: its length, at least 1e-30.
+        pub normal: [f32; 4],
         /// Intensity, irradiance or radiance; w: area of quad or triangle.
         pub radiance: [f32; 4],
         /// `LIGHT_*`.
