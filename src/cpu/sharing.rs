@@ -76,6 +76,8 @@ fn quarter_of(member: u32) -> u32 {
 /// Of the points of one sample to the members of its tile, by [`link_of`].
 pub type Links = [f32; LINKS as usize];
 
+const NO_LINKS: Links = [0.0; LINKS as usize];
+
 /// `kind`: `POINT_*`.
 fn link_to(frame: &Frame, first: &FirstVertex, point: &SharedPoint, kind: u32) -> Link {
     let to_point = point.position - first.origin.position;
@@ -152,15 +154,15 @@ fn link_of(kind: u32, from: u32, to: u32) -> u32 {
 }
 
 /// Weighs the points of one member's sample against all members that could have drawn them: how much of a point's radiance each of them
-/// takes, albedo and throughput apart. `probe` traces and counts.
+/// takes, albedo and throughput apart; none where nothing leaves them. `probe` traces and counts.
 pub fn link_points(
     scene: &PackedScene,
     samples: &[InFlight],
     members: &[Member],
     from: Member,
     probe: &mut PathState,
-) -> Links {
-    let mut links = [0.0; LINKS as usize];
+) -> Option<Links> {
+    let mut links = None;
     let kept = samples[from.slot].state.first.kept;
     for kind in 0..POINTS {
         let point = samples[from.slot].state.points[kind as usize];
@@ -169,9 +171,11 @@ pub fn link_points(
         }
         if is_unusable(point.radiance) {
             // One sample's fault stays its own.
-            links[link_of(kind, from.number, from.number) as usize] = 1.0;
+            let place = link_of(kind, from.number, from.number);
+            links.get_or_insert(NO_LINKS)[place as usize] = 1.0;
             continue;
         }
+        let links = links.get_or_insert(NO_LINKS);
         let mut density = 0.0;
         for member in members {
             let place = link_of(kind, from.number, member.number);
@@ -195,10 +199,10 @@ pub fn link_points(
     links
 }
 
-/// What a member's sample takes of the points of all members' samples, by their links.
-pub fn gather(samples: &[InFlight], members: &[Member], links: &[Links], to: Member) -> Vec3 {
+/// What a member's sample takes of the points of its tile, by their links from the members that have found them.
+pub fn gather(samples: &[InFlight], linked: &[(Member, Links)], to: Member) -> Vec3 {
     let mut light = Vec3::ZERO;
-    for (from, links) in members.iter().zip(links) {
+    for (from, links) in linked {
         for kind in 0..POINTS {
             let point = &samples[from.slot].state.points[kind as usize];
             let place = link_of(kind, from.number, to.number);

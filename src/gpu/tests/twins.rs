@@ -39,6 +39,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "is_regular newton undistort",
         "the proof, in f64, when a scene is read",
     ),
+    (
+        "cpu::state",
+        "renew",
+        "the CPU uses states again; a shader writes the parts that it needs",
+    ),
     ("cpu::vertex", "max_element", "glam has it"),
     (
         "cpu::photons::emission",
