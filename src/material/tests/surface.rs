@@ -428,13 +428,9 @@ pub fn gallery(random: &mut Random) -> PackedScene {
                 uv1: [random.uniform(), random.uniform(), 0.0, 0.0],
             });
         }
-        scene.triangles.push(Triangle {
-            vertices: [3 * id, 3 * id + 1, 3 * id + 2],
-            material: id,
-            light: NONE,
-            object: id % 5,
-            pad: [0; 2],
-        });
+        let vertices = [3 * id, 3 * id + 1, 3 * id + 2];
+        let triangle = Triangle::new(vertices, &scene.vertices, id, id % 5);
+        scene.triangles.push(triangle);
     }
     let (width, height) = (16, 12);
     scene.frame = Frame {
