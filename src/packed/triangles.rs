@@ -58,3 +58,33 @@ fn plane_error(e1: Vec3, e2: Vec3) -> f32 {
     let slimness = safe_sqrt(dot3(n, n)).max(SLIMMEST);
     PLANE_ERROR * length / slimness
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle(corners: [[f32; 3]; 3], alpha: f32) -> Triangle {
+        let vertices = corners.map(|[x, y, z]| Vertex {
+            position_u0: [x, y, z, 0.0],
+            color: [1.0, 1.0, 1.0, alpha],
+            ..Vertex::default()
+        });
+        Triangle::new([0, 1, 2], &vertices, 0, 0)
+    }
+
+    #[test]
+    fn a_triangle_knows_its_normal_and_how_well_its_plane_is_met() {
+        let right = triangle([[1.0, 1.0, 2.0], [3.0, 1.0, 2.0], [1.0, 3.0, 2.0]], 1.0);
+        assert_eq!(right.normal, [0.0, 0.0, 1.0]);
+        assert_eq!(right.plane_error, 2.0 * PLANE_ERROR);
+        assert_eq!(right.flags, TRIANGLE_UNTINTED);
+        let turned = triangle([[1.0, 1.0, 2.0], [1.0, 3.0, 2.0], [3.0, 1.0, 2.0]], 0.5);
+        assert_eq!((turned.normal, turned.flags), ([0.0, 0.0, -1.0], 0));
+        let tiny = triangle([[0.0; 3], [1e-25, 0.0, 0.0], [0.0, 1e-25, 0.0]], 1.0);
+        assert_eq!(tiny.normal, [0.0, 0.0, 1.0]);
+        let sliver = triangle([[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1e-7, 0.0]], 1.0);
+        assert_eq!(sliver.plane_error, PLANE_ERROR / SLIMMEST);
+        let none = triangle([[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], 1.0);
+        assert_eq!(none.normal, [0.0; 3]);
+    }
+}
