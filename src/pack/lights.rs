@@ -102,7 +102,7 @@ fn blank(kind: u32, side: u32) -> Light {
         axis_v: [0.0; 4],
         unit_u: [0.0; 4],
         unit_v: [0.0; 4],
-        normal: [0.0; 4],
+        normal: [0.0, 0.0, 0.0, 1.0],
         radiance: [0.0; 4],
         kind,
         side,

@@ -217,7 +217,7 @@ shared! {
         /// Quads and triangles: unit axis_u and axis_v; w: their lengths, metres.
         pub unit_u: [f32; 4],
         pub unit_v: [f32; 4],
-        /// Quads and triangles: axis_u x axis_v; w: its length, at least 1e-30.
+        /// Quads and triangles: axis_u x axis_v; w: its length, at least 1e-30. Of other lights 0, 0, 0 and 1.
         pub normal: [f32; 4],
         /// Intensity, irradiance or radiance; w: area of quad or triangle.
         pub radiance: [f32; 4],

@@ -140,7 +140,7 @@ const OTHER_ARGUMENTS: &[(&str, &str, &str)] = &[
     ("cpu::estimator", "begin_sample", "likewise"),
     (
         "cpu::sharing",
-        "link_points gather",
+        "link_probability link_points gather",
         "the CPU passes the members of a tile and what they have; a lane finds them",
     ),
     (
