@@ -137,7 +137,6 @@ const OTHER_ARGUMENTS: &[(&str, &str, &str)] = &[
         "path_state",
         "a shader's sample has a lane, where the parts of its state lie",
     ),
-    ("cpu::estimator", "begin_sample", "likewise"),
     (
         "cpu::sharing",
         "link_probability link_points gather",

@@ -275,6 +275,7 @@ fn opacity_follows_the_alpha_mode() {
         for vertex in &mut scene.vertices {
             vertex.color = [0.5, 1.0, 1.0, 0.9];
         }
+        scene.triangles = vec![Triangle::new([0, 1, 2], &scene.vertices, 0, 7)];
         let alpha = surface_alpha(&scene, hit(u, 0.1));
         let surface = surface_at(&scene, hit(u, 0.1), -Vec3::Z);
         assert!((surface.coverage - alpha).abs() < 1e-6);
