@@ -11,10 +11,12 @@ import package::material::scatter::{lambert_cos, terminator};
 import package::math::{INV_PI, dot3, length3, safe_sqrt};
 import package::cpu::panes::blocks;
 import package::cpu::request::answer;
-import package::cpu::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS};
+import package::camera::sampler::sample_set;
+import package::cpu::contribution::{LINK_SET, sample_key};
+import package::cpu::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS, plays};
 import package::cpu::state::{
     FIRST_NONE, FIRST_VIRTUAL, FirstVertex, POINTS, POINT_COVERED, POINT_RECURSION, PathRay, PathState, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED,
-    SharedPoint, path_firsts, path_links, path_points,
+    SharedPoint, path_firsts, path_links, path_points, paths,
 };
 
 fn tile_of(width: u32, pixel: u32) -> u32 {
@@ -98,10 +100,33 @@ fn tile_lanes(lane: u32) -> vec2<u32> {
     return vec2<u32>(lane - tile % TILE_PLACES, tile / TILE_PLACES);
 }
 
+fn light_of(point: SharedPoint) -> f32 {
+    if point.strength == 0.0 || is_unusable(point.radiance) { return 0.0; }
+    let size = abs(point.radiance);
+    return max(max(size.x, size.y), size.z) / point.strength;
+}
+
+fn link_probability(source: u32, kind: u32) -> f32 {
+    if kind != POINT_RECURSION { return 1.0; }
+    let lanes = tile_lanes(source);
+    let kept = path_firsts[source].kept;
+    var sum = 0.0;
+    var count = 0.0;
+    for (var member = lanes.x; member < lanes.x + lanes.y; member++) {
+        let light = light_of(path_points[member][kind]);
+        if path_firsts[member].kept == kept && light > 0.0 {
+            sum += light;
+            count += 1.0;
+        }
+    }
+    return min(light_of(path_points[source][kind]) * count / sum, 1.0);
+}
+
 fn link_points(st: ptr<function, PathState>, thread: u32) {
     let lane = (*st).lane;
     let lanes = tile_lanes(lane);
     let number = number_of(lane);
+    (*st).path = paths[lane];
     let kept = path_firsts[lane].kept;
     for (var place = 0u; place < LINKS; place++) { path_links[lane][place] = 0.0; }
     for (var kind = 0u; kind < POINTS; kind++) {
@@ -111,6 +136,8 @@ fn link_points(st: ptr<function, PathState>, thread: u32) {
             path_links[lane][link_of(kind, number, number)] = 1.0;
             continue;
         }
+        let probability = link_probability(lane, kind);
+        if !plays(sample_set(sample_key(st), LINK_SET), probability) { continue; }
         var density = 0.0;
         for (var member = lanes.x; member < lanes.x + lanes.y; member++) {
             let place = link_of(kind, number, number_of(member));
@@ -126,7 +153,7 @@ fn link_points(st: ptr<function, PathState>, thread: u32) {
                 }
             }
         }
-        let scale = 1.0 / max(density * point.strength, MIN_POSITIVE);
+        let scale = 1.0 / max(density * point.strength * probability, MIN_POSITIVE);
         for (var place = first_link(kind); place < first_link(kind + 1u); place++) { path_links[lane][place] *= scale; }
     }
 }

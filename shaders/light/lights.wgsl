@@ -4,7 +4,7 @@ import package::gpu::buffers::{frame, lights};
 import package::packed::records::{LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, SIDE_REAL};
 import package::shared::NONE;
 import package::light::environment::{env_evaluate, env_radiance, env_sample};
-import package::math::{cross3, dot3, length3, safe_sqrt};
+import package::math::{dot3, length3, safe_sqrt};
 import package::cpu::state::FAR;
 @if(area_lights) import package::light::rectangle::{rectangle_from, sample_rectangle};
 @if(area_lights) import package::material::surface::triangle_emission;
@@ -72,16 +72,21 @@ fn sample_area_light(light: Light, position: vec3<f32>, u0: f32, u1: f32) -> Lig
         a = root * (1.0 - u1);
         b = root * u1;
     }
-    var to_light = (light.position.xyz - position) + (light.axis_u.xyz * a + light.axis_v.xyz * b);
-    if rectangle.solid_angle > 0.0 {
+    let by_solid_angle = rectangle.solid_angle > 0.0;
+    var to_light: vec3<f32>;
+    if by_solid_angle {
         to_light = sample_rectangle(rectangle, u0, u1);
+    } else {
+        to_light = (light.position.xyz - position) + (light.axis_u.xyz * a + light.axis_v.xyz * b);
     }
     let distance = length3(to_light);
     if distance <= 0.0 { return no_light(); }
     let direction = to_light / distance;
-    var pdf = area_pdf(light, direction, distance);
-    if rectangle.solid_angle > 0.0 {
+    var pdf: f32;
+    if by_solid_angle {
         pdf = light.select_pdf / rectangle.solid_angle;
+    } else {
+        pdf = area_pdf(light, direction, distance);
     }
     if pdf <= 0.0 { return no_light(); }
     var radiance = light.radiance.xyz;
@@ -94,8 +99,7 @@ fn sample_area_light(light: Light, position: vec3<f32>, u0: f32, u1: f32) -> Lig
 @if(area_lights)
 fn area_pdf(light: Light, direction: vec3<f32>, distance: f32) -> f32 {
     let area = light.radiance.w;
-    let normal = cross3(light.axis_u.xyz, light.axis_v.xyz);
-    var cos = -dot3(direction, normal) / max(length3(normal), 1e-30);
+    var cos = -dot3(direction, light.normal.xyz) / light.normal.w;
     if light.kind != LIGHT_QUAD { cos = abs(cos); }
     if cos <= 0.0 { return 0.0; }
     return light.select_pdf * distance * distance / (area * cos);

@@ -1,22 +1,20 @@
 // Rectangular lights by solid angle. Rust twin: src/light/rectangle.rs, where the formulas are explained.
 
 import package::packed::records::{LIGHT_QUAD, Light};
-import package::math::{INV_TAU, TAU, atan2_, cross3, dot3, length3, safe_sqrt, sincos_2pi};
+import package::math::{INV_TAU, TAU, atan2_, cross3, dot3, safe_sqrt, sincos_2pi};
 
 fn is_right_angle(ex: vec3<f32>, ey: vec3<f32>) -> bool {
     return abs(dot3(ex, ey)) <= RIGHT_ANGLE;
 }
 
 fn rectangle_from(light: Light, position: vec3<f32>) -> Rectangle {
-    let width = length3(light.axis_u.xyz);
-    let depth = length3(light.axis_v.xyz);
-    let ex = light.axis_u.xyz / width;
-    let ey = light.axis_v.xyz / depth;
+    let ex = light.unit_u.xyz;
+    let ey = light.unit_v.xyz;
     let ez = cross3(ex, ey);
     let offset = light.position.xyz - position;
     let x0 = dot3(offset, ex);
     let y0 = dot3(offset, ey);
-    var r = Rectangle(ex, ey, ez, x0, x0 + width, y0, y0 + depth, -dot3(offset, ez), 0.0, 0.0);
+    var r = Rectangle(ex, ey, ez, x0, x0 + light.unit_u.w, y0, y0 + light.unit_v.w, -dot3(offset, ez), 0.0, 0.0);
     if light.kind != LIGHT_QUAD || !is_right_angle(ex, ey) || r.height <= 0.0 { return r; }
     let inv_height = 1.0 / r.height;
     let nx0 = in_heights(r.x0, inv_height);

@@ -10,22 +10,6 @@ fn unit(v: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(0.0, 0.0, 1.0);
 }
 
-fn triangle_normal(e1: vec3<f32>, e2: vec3<f32>, fallback: vec3<f32>) -> vec3<f32> {
-    let a1 = abs(e1);
-    let a2 = abs(e2);
-    let m1 = max(max(a1.x, a1.y), a1.z);
-    let m2 = max(max(a2.x, a2.y), a2.z);
-    if m1 <= 1e-36 || m2 <= 1e-36 {
-        return fallback;
-    }
-    let n = cross3(e1 * (1.0 / m1), e2 * (1.0 / m2));
-    let length2 = dot3(n, n);
-    if length2 > 1e-30 {
-        return n * (1.0 / sqrt(length2));
-    }
-    return fallback;
-}
-
 fn tangent_from_uv(e1: vec3<f32>, e2: vec3<f32>, d1: vec2<f32>, d2: vec2<f32>, normal: vec3<f32>) -> vec4<f32> {
     let det = d1.x * d2.y - d2.x * d1.y;
     let along_u = (e1 * d2.y - e2 * d1.y) * det;

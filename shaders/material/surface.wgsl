@@ -3,15 +3,15 @@
 import package::gpu::buffers::{frame, materials, photo_albedo, texture_refs, triangles, vertices};
 import package::packed::materials::Material;
 import package::packed::records::{
-    Vertex, TEXTURE_UV1, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
+    Vertex, TEXTURE_UV1, TRIANGLE_UNTINTED, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
     MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, PHOTO_PATCHES,
 };
 import package::shared::NONE;
 @if(photo_albedo) import package::camera::lens::camera_project;
-import package::math::{cross3, dot3, safe_sqrt};
+import package::math::dot3;
 import package::material::facets::{TABLE_SIZE, kept_by_facets};
 import package::material::ggx::{DELTA_ALPHA, transmits_unblurred};
-import package::material::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
+import package::material::normal::{mapped_normal, tangent_from_uv, unit, valid_shading_normal};
 import package::material::texture::{slot, slot_rgb, texture_sample};
 import package::accel::trace::Hit;
 
@@ -137,19 +137,6 @@ fn perturbed(map: u32, scale: f32, normal: vec3<f32>, v0: Vertex, v1: Vertex, v2
     return mapped_normal(normal, tangent, texel.xyz, scale);
 }
 
-fn plane_error(e1: vec3<f32>, e2: vec3<f32>) -> f32 {
-    let a1 = abs(e1);
-    let a2 = abs(e2);
-    let length = max(max(max(a1.x, a1.y), a1.z), max(max(a2.x, a2.y), a2.z));
-    if length <= 1e-36 {
-        return 0.0;
-    }
-    let inv = 1.0 / length;
-    let n = cross3(e1 * inv, e2 * inv);
-    let slimness = max(safe_sqrt(dot3(n, n)), SLIMMEST);
-    return PLANE_ERROR * length / slimness;
-}
-
 fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
     let triangle = triangles[hit.triangle];
     let entry = materials[triangle.material];
@@ -165,17 +152,19 @@ fn surface_at(hit: Hit, ray_direction: vec3<f32>) -> Surface {
     let magnitude = blend3(abs(b), a0, abs(p1), abs(p2));
     let position_error = GAMMA_7 * (magnitude.x + magnitude.y + magnitude.z)
         + BARYCENTRIC_ERROR * (a0.x + a0.y + a0.z);
-    let error = max(position_error, plane_error(p1 - p0, p2 - p0));
+    let error = max(position_error, triangle.plane_error);
 
     let blended = unit(blend3(b, v0.normal_v0.xyz, v1.normal_v0.xyz, v2.normal_v0.xyz));
-    let outward = triangle_normal(p1 - p0, p2 - p0, blended);
+    var outward = triangle.normal;
+    if all(outward == vec3<f32>(0.0)) { outward = blended; }
     let wo = -ray_direction;
     let front = dot3(wo, outward) >= 0.0;
     let facing = select(-1.0, 1.0, front);
     let ng = outward * facing;
     let interpolated = select(blended, -blended, dot3(blended, outward) < 0.0);
 
-    let color = blend4(b, v0.color, v1.color, v2.color);
+    var color = vec4<f32>(b.x + b.y + b.z);
+    if (triangle.flags & TRIANGLE_UNTINTED) == 0u { color = blend4(b, v0.color, v1.color, v2.color); }
     var base = entry.base_color * color;
     var metallic = entry.metallic;
     var roughness = entry.roughness;

@@ -1,5 +1,7 @@
 //! Few spheres that contain all triangles.
 
+use std::collections::HashSet;
+
 use glam::{DVec3, Vec3};
 
 /// A split must take at least this share off the summed squares of the radii.
@@ -104,16 +106,22 @@ fn corners(mesh: &[[Vec3; 3]], triangle: u32) -> impl Iterator<Item = DVec3> + '
 
 impl Cluster {
     fn new(mesh: &[[Vec3; 3]], triangles: Vec<u32>) -> Cluster {
-        let points = || triangles.iter().flat_map(|&t| corners(mesh, t));
+        // Most corners are those of several triangles.
+        let mut known = HashSet::new();
+        let points: Vec<DVec3> = (triangles.iter())
+            .flat_map(|&triangle| mesh[triangle as usize])
+            .filter(|corner| known.insert(corner.to_array().map(f32::to_bits)))
+            .map(|corner| corner.as_dvec3())
+            .collect();
         let mut low = DVec3::INFINITY;
         let mut high = DVec3::NEG_INFINITY;
-        for point in points() {
+        for &point in &points {
             low = low.min(point);
             high = high.max(point);
         }
         let farthest = |center: DVec3| {
             let mut worst = (0.0, center);
-            for point in points() {
+            for &point in &points {
                 let squared = point.distance_squared(center);
                 if squared > worst.0 {
                     worst = (squared, point);

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::batch::run_alone;
 use super::estimator::begin_sample;
+use super::state::path_state;
 use crate::math::luminance;
 use crate::packed::{FRAME_BACKDROP, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene};
 
@@ -31,7 +32,8 @@ fn light_of_virtual(scene: &PackedScene) -> f64 {
     samples
         .map(|i| {
             let at = i * pixels.len() / SAMPLES.min(64 * pixels.len());
-            let mut state = begin_sample(scene, pixels[at], i as u32 % 64, false);
+            let mut state = path_state(0, 0);
+            begin_sample(scene, &mut state, pixels[at], i as u32 % 64, false);
             run_alone(scene, &mut state);
             let light = f64::from(luminance(state.result.radiance));
             if state.result.mask != 0 && light.is_finite() {

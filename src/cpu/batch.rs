@@ -6,7 +6,7 @@
 use super::estimator::{advance, begin_sample};
 use super::in_flight::{InFlight, Member};
 use super::request::answer;
-use super::sharing::{LINKS, MEMBERS, TILE_STRIDE, gather, link_points, member_of, tile_of};
+use super::sharing::{TILE_STRIDE, gather, link_points, member_of, tile_of};
 use super::state::{FIRST_NONE, PathState, STAGE_COUNT, STAGE_DONE, path_state};
 use crate::packed::PackedScene;
 use crate::work::SampleRays;
@@ -24,7 +24,9 @@ pub fn run_alone(scene: &PackedScene, state: &mut PathState) {
 
 /// Samples in flight.
 pub struct Batch {
+    /// The first `len` are in flight; what comes after them has been, and is used again.
     samples: Vec<InFlight>,
+    len: usize,
     waiting: Queues,
     /// Empty between two steps.
     advanced: Queues,
@@ -36,6 +38,7 @@ impl Default for Batch {
     fn default() -> Self {
         Self {
             samples: Vec::new(),
+            len: 0,
             waiting: Queues::default(),
             advanced: Queues::default(),
             probe: path_state(0, 0),
@@ -49,14 +52,19 @@ impl Batch {
 
     /// Begins a sample, as [`begin_sample`].
     pub fn generate(&mut self, scene: &PackedScene, pixel: u32, index: u32, real_pass: bool) {
-        let slot = self.samples.len() as u16;
-        let state = begin_sample(scene, pixel, index, real_pass);
-        self.waiting[state.path.stage as usize].push(slot);
-        self.samples.push(InFlight { index, state });
+        if self.len == self.samples.len() {
+            let state = path_state(pixel, index);
+            self.samples.push(InFlight { index, state });
+        }
+        let sample = &mut self.samples[self.len];
+        sample.index = index;
+        begin_sample(scene, &mut sample.state, pixel, index, real_pass);
+        self.waiting[sample.state.path.stage as usize].push(self.len as u16);
+        self.len += 1;
     }
 
     pub fn len(&self) -> usize {
-        self.samples.len()
+        self.len
     }
 
     /// Takes all samples to their end.
@@ -92,7 +100,7 @@ impl Batch {
         let width = scene.frame.width;
         let probe = &mut self.probe;
         let mut tiles = [const { Vec::new() }; (TILE_STRIDE * TILE_STRIDE) as usize];
-        for samples in self.samples.chunk_by_mut(|a, b| a.index == b.index) {
+        for samples in self.samples[..self.len].chunk_by_mut(|a, b| a.index == b.index) {
             for (slot, sample) in samples.iter().enumerate() {
                 let state = &sample.state;
                 if state.first.kept != FIRST_NONE {
@@ -103,13 +111,16 @@ impl Batch {
                 }
             }
             for members in &mut tiles {
-                let mut links = [[0.0; LINKS as usize]; MEMBERS as usize];
-                for (links, &from) in links.iter_mut().zip(members.iter()) {
-                    *links = link_points(scene, samples, members, from, probe);
-                }
-                for &to in members.iter() {
-                    let light = gather(samples, members, &links, to);
-                    samples[to.slot].state.result.radiance += light;
+                let linked: Vec<_> = (members.iter())
+                    .filter_map(|&from| {
+                        Some((from, link_points(scene, samples, members, from, probe)?))
+                    })
+                    .collect();
+                if !linked.is_empty() {
+                    for &to in members.iter() {
+                        let light = gather(samples, &linked, to);
+                        samples[to.slot].state.result.radiance += light;
+                    }
                 }
                 members.clear();
             }
@@ -123,12 +134,12 @@ impl Batch {
 
     /// In the order in which they were begun.
     pub fn samples(&self) -> &[InFlight] {
-        &self.samples
+        &self.samples[..self.len]
     }
 
     /// Makes room for others, once all are at their end.
     pub fn clear(&mut self) {
-        self.samples.clear();
+        self.len = 0;
     }
 }
 
@@ -149,8 +160,9 @@ mod tests {
             let depth = state.first_hit.depth_m.to_bits();
             (radiance, state.result.mask, depth, state.rays)
         };
+        let mut batch = Batch::default();
         for real_pass in [false, true] {
-            let mut batch = Batch::default();
+            batch.clear();
             let wanted = (0..300).map(|i| (i * 10, i % 3));
             for (pixel, index) in wanted.clone() {
                 batch.generate(&scene, pixel, index, real_pass);
@@ -158,7 +170,8 @@ mod tests {
             batch.run(&scene);
             let alone: Vec<_> = wanted
                 .map(|(pixel, index)| {
-                    let mut state = begin_sample(&scene, pixel, index, real_pass);
+                    let mut state = path_state(pixel, index);
+                    begin_sample(&scene, &mut state, pixel, index, real_pass);
                     run_alone(&scene, &mut state);
                     found(&state)
                 })

@@ -11,7 +11,8 @@ use crate::packed::{
 use crate::shared::shared;
 
 shared! {
-    // Sample sets: 0 is pixel and lens, then five a depth from 7 on.
+    // Sample sets: 0 is pixel and lens, 1 the roulette on links, then five a depth from 7 on.
+    pub const LINK_SET: u32 = 1;
     pub const SET_DIFFERENCE_LIGHT: u32 = 0;
     pub const SET_DIFFERENCE_BSDF: u32 = 1;
     pub const SET_DIFFERENCE_CONE: u32 = 2;

@@ -68,9 +68,15 @@ pub fn is_without_turn(scene: &PackedScene, pixel: u32, index: u32) -> bool {
         && difference_turn(scene, pixel, index) == NONE
 }
 
-/// Sets up the primary ray. `real_pass` renders the real radiance and the mask alone, for pixels that need Ir.
-pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool) -> PathState {
-    let mut st = path_state(pixel, index);
+/// Begins a sample in a state that is new or done: sets up the primary ray. `real_pass` renders the real radiance and the mask alone, for pixels that need Ir.
+pub fn begin_sample(
+    scene: &PackedScene,
+    st: &mut PathState,
+    pixel: u32,
+    index: u32,
+    real_pass: bool,
+) {
+    renew(st, pixel, index);
     let may_meet_virtual = scene.pixels[pixel as usize].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0;
     let direct = !real_pass && scene.frame.estimator != ESTIMATOR_PAPER;
     if direct && !may_meet_virtual {
@@ -79,18 +85,18 @@ pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool
         if turn != NONE {
             st.path.index = turn;
         } else if scene.frame.flags & FRAME_AOVS == 0 {
-            return st;
+            return;
         }
-        primary_missed_virtual(scene, &mut st, turn != NONE);
+        primary_missed_virtual(scene, st, turn != NONE);
     }
     // A replayed sample's primary ray was counted when it was first taken.
     st.rays.primary = u32::from(!real_pass);
-    let u = sample_4d(sample_key(scene, &st), 0);
+    let u = sample_4d(sample_key(scene, st), 0);
     let x = (pixel % scene.frame.width) as f32 + u[0];
     let y = (pixel / scene.frame.width) as f32 + u[1];
     let mut pose = camera_pose(&scene.frame);
     if scene.frame.flags & FRAME_SHUTTER != 0 {
-        let key = sample_key(scene, &st);
+        let key = sample_key(scene, st);
         let share = shutter_share(&scene.frame, key, index, pixel / scene.frame.width);
         pose = camera_pose_at(&scene.frame, share);
     }
@@ -115,7 +121,6 @@ pub fn begin_sample(scene: &PackedScene, pixel: u32, index: u32, real_pass: bool
         st.path.stage = STAGE_PRIMARY_VIRTUAL;
         st.ray.request = REQUEST_CLOSEST_VIRTUAL;
     }
-    st
 }
 
 /// Consumes the hits in `st` and either asks for the next ray or finishes the sample.

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::batch::{Batch, run_alone};
 use super::estimator::{begin_sample, is_without_turn};
 use super::in_flight::InFlight;
+use super::state::path_state;
 use super::tiles::{Tile, TileWork, tiles};
 use crate::film::{Film, Sample, guide_add, pixel_add_real};
 use crate::packed::{ESTIMATOR_PAPER, PackedScene};
@@ -108,7 +109,8 @@ fn add_sample(scene: &PackedScene, tile: &mut Tile<'_>, pass: Pass, sample: &InF
 
 /// Real radiance of one sample before exposure, and the albedo of its first hit (0 where nothing is hit); wants `FRAME_AOVS`.
 pub fn render_first_hit(scene: &PackedScene, pixel: u32, index: u32) -> (Vec3, Vec3) {
-    let mut st = begin_sample(scene, pixel, index, true);
+    let mut st = path_state(pixel, index);
+    begin_sample(scene, &mut st, pixel, index, true);
     run_alone(scene, &mut st);
     (st.result.radiance, st.first_hit.albedo)
 }

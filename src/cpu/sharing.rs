@@ -14,11 +14,13 @@
 
 use glam::Vec3;
 
+use super::contribution::{LINK_SET, sample_key};
 use super::in_flight::{InFlight, Member};
 use super::panes::blocks;
 use super::request::answer;
 use super::state::*;
-use super::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS};
+use super::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS, plays};
+use crate::camera::sampler::sample_set;
 use crate::film::is_unusable;
 use crate::light::cones::{cone_pdf, cones_at};
 use crate::material::scatter::{lambert_cos, terminator};
@@ -76,6 +78,8 @@ fn quarter_of(member: u32) -> u32 {
 
 /// Of the points of one sample to the members of its tile, by [`link_of`].
 pub type Links = [f32; LINKS as usize];
+
+const NO_LINKS: Links = [0.0; LINKS as usize];
 
 /// `kind`: `POINT_*`.
 fn link_to(frame: &Frame, first: &FirstVertex, point: &SharedPoint, kind: u32) -> Link {
@@ -158,27 +162,61 @@ fn link_of(kind: u32, from: u32, to: u32) -> u32 {
     first_link(kind) + row % QUARTER_SIDE * QUARTER_SIDE + column % QUARTER_SIDE
 }
 
+/// Largest channel of what leaves a point; 0 where there is nothing to share.
+fn light_of(point: &SharedPoint) -> f32 {
+    if point.strength == 0.0 || is_unusable(point.radiance) {
+        return 0.0;
+    }
+    point.radiance.abs().max_element() / point.strength
+}
+
+/// With what probability one member's point is linked at all: in proportion to what leaves it, for certain from the tile's mean on. Points of
+/// the cones send out nearly equal light and have few links.
+fn link_probability(samples: &[InFlight], members: &[Member], from: Member, kind: u32) -> f32 {
+    if kind != POINT_RECURSION {
+        return 1.0;
+    }
+    let light = |member: Member| light_of(&samples[member.slot].state.points[kind as usize]);
+    let kept = samples[from.slot].state.first.kept;
+    let (mut sum, mut count) = (0.0, 0.0);
+    for &member in members {
+        let of_member = light(member);
+        if samples[member.slot].state.first.kept == kept && of_member > 0.0 {
+            sum += of_member;
+            count += 1.0;
+        }
+    }
+    (light(from) * count / sum).min(1.0)
+}
+
 /// Weighs the points of one member's sample against all members that could have drawn them: how much of a point's radiance each of them
-/// takes, albedo and throughput apart. `probe` traces and counts.
+/// takes, albedo and throughput apart; none where nothing leaves them. `probe` traces and counts.
 pub fn link_points(
     scene: &PackedScene,
     samples: &[InFlight],
     members: &[Member],
     from: Member,
     probe: &mut PathState,
-) -> Links {
-    let mut links = [0.0; LINKS as usize];
-    let kept = samples[from.slot].state.first.kept;
+) -> Option<Links> {
+    let mut links = None;
+    let state = &samples[from.slot].state;
+    let kept = state.first.kept;
     for kind in 0..POINTS {
-        let point = samples[from.slot].state.points[kind as usize];
+        let point = state.points[kind as usize];
         if point.strength == 0.0 || point.radiance == Vec3::ZERO {
             continue;
         }
         if is_unusable(point.radiance) {
             // One sample's fault stays its own.
-            links[link_of(kind, from.number, from.number) as usize] = 1.0;
+            let place = link_of(kind, from.number, from.number);
+            links.get_or_insert(NO_LINKS)[place as usize] = 1.0;
             continue;
         }
+        let probability = link_probability(samples, members, from, kind);
+        if !plays(&sample_set(sample_key(scene, state), LINK_SET), probability) {
+            continue;
+        }
+        let links = links.get_or_insert(NO_LINKS);
         let mut density = 0.0;
         for member in members {
             let place = link_of(kind, from.number, member.number);
@@ -194,7 +232,7 @@ pub fn link_points(
                 density += link.density;
             }
         }
-        let scale = 1.0 / (density * point.strength).max(MIN_POSITIVE);
+        let scale = 1.0 / (density * point.strength * probability).max(MIN_POSITIVE);
         for place in first_link(kind)..first_link(kind + 1) {
             links[place as usize] *= scale;
         }
@@ -202,10 +240,10 @@ pub fn link_points(
     links
 }
 
-/// What a member's sample takes of the points of all members' samples, by their links.
-pub fn gather(samples: &[InFlight], members: &[Member], links: &[Links], to: Member) -> Vec3 {
+/// What a member's sample takes of the points of its tile, by their links from the members that have found them.
+pub fn gather(samples: &[InFlight], linked: &[(Member, Links)], to: Member) -> Vec3 {
     let mut light = Vec3::ZERO;
-    for (from, links) in members.iter().zip(links) {
+    for (from, links) in linked {
         for kind in 0..POINTS {
             let point = &samples[from.slot].state.points[kind as usize];
             let place = link_of(kind, from.number, to.number);
@@ -253,6 +291,36 @@ mod tests {
             links.sort_unstable();
             assert!(links.iter().copied().eq(0..LINKS), "{links:?}");
         }
+    }
+
+    #[test]
+    fn points_are_linked_in_proportion_to_what_leaves_them() {
+        let light = [8.0, 1.0, 3.0, 0.0, f32::NAN];
+        let samples: Vec<_> = (light.iter())
+            .map(|&light| {
+                let mut state = path_state(0, 0);
+                state.first.kept = FIRST_DIFFERENCE;
+                for point in &mut state.points {
+                    // Strength is in the radiance, too.
+                    point.strength = 0.5;
+                    point.radiance = Vec3::new(0.1, -0.5, 0.2) * light;
+                }
+                InFlight { index: 0, state }
+            })
+            .collect();
+        let members: Vec<_> = (0..light.len())
+            .map(|slot| Member {
+                slot,
+                number: slot as u32,
+            })
+            .collect();
+        let probabilities = |kind: u32| {
+            let of = |from: &Member| link_probability(&samples, &members, *from, kind);
+            members[..3].iter().map(of).collect::<Vec<_>>()
+        };
+        // Of those that send out anything the mean is 4.
+        assert_eq!(probabilities(POINT_RECURSION), [1.0, 0.25, 0.75]);
+        assert_eq!(probabilities(POINT_COVERING), [1.0; 3], "control");
     }
 
     /// A disc of radius R that faces a point of a plane at distance h sends it R^2 / (R^2 + h^2) of what an infinite one does.

@@ -349,35 +349,57 @@ const NO_POINT: SharedPoint = SharedPoint {
     pad: 0,
 };
 
+const NO_RAY: PathRay = PathRay {
+    origin: NO_ORIGIN,
+    direction: Vec3::ZERO,
+    t_max: f32::INFINITY,
+    request: 0,
+    side: SIDE_NONE,
+    depth: 0,
+    opacity_seed: 0,
+};
+
+const NO_HITS: Hits = Hits {
+    in_real: MISS,
+    in_virtual: MISS,
+};
+
+const NO_PATH: Path = Path {
+    throughput: Vec3::ONE,
+    density: DELTA_DENSITY,
+    shadow_contribution: Vec3::ZERO,
+    weight: 1.0,
+    pixel: 0,
+    index: 0,
+    stage: STAGE_DONE,
+    mode: MODE_MIXED,
+    pending: 0,
+    medium: NONE,
+    events: 0,
+    real_depth: 0,
+};
+
+const NO_RESULT: PathResult = PathResult {
+    radiance: Vec3::ZERO,
+    mask: 0,
+};
+
+const NO_FIRST_HIT: FirstHit = FirstHit {
+    normal: Vec3::ZERO,
+    depth_m: f32::INFINITY,
+    albedo: Vec3::ZERO,
+    pad: 0,
+};
+
 /// A sample that has not begun.
 pub fn path_state(pixel: u32, index: u32) -> PathState {
     PathState {
-        ray: PathRay {
-            origin: NO_ORIGIN,
-            direction: Vec3::ZERO,
-            t_max: f32::INFINITY,
-            request: 0,
-            side: SIDE_NONE,
-            depth: 0,
-            opacity_seed: 0,
-        },
-        hits: Hits {
-            in_real: MISS,
-            in_virtual: MISS,
-        },
+        ray: NO_RAY,
+        hits: NO_HITS,
         path: Path {
-            throughput: Vec3::ONE,
-            density: DELTA_DENSITY,
-            shadow_contribution: Vec3::ZERO,
-            weight: 1.0,
             pixel,
             index,
-            stage: STAGE_DONE,
-            mode: MODE_MIXED,
-            pending: 0,
-            medium: NONE,
-            events: 0,
-            real_depth: 0,
+            ..NO_PATH
         },
         next: NO_SEGMENT,
         real: RealPath {
@@ -394,21 +416,35 @@ pub fn path_state(pixel: u32, index: u32) -> PathState {
             events: 0,
             pad: 0,
         },
-        result: PathResult {
-            radiance: Vec3::ZERO,
-            mask: 0,
-        },
+        result: NO_RESULT,
         radiance_real: Vec3::ZERO,
-        first_hit: FirstHit {
-            normal: Vec3::ZERO,
-            depth_m: f32::INFINITY,
-            albedo: Vec3::ZERO,
-            pad: 0,
-        },
+        first_hit: NO_FIRST_HIT,
         first: NO_FIRST_VERTEX,
         points: [NO_POINT; POINTS as usize],
         vertex_hit: MISS,
         passed_m: 0.0,
         rays: SampleRays::default(),
     }
+}
+
+/// Makes the state of a sample that is done that of one that has not begun, but for what is only read once it is written.
+pub fn renew(st: &mut PathState, pixel: u32, index: u32) {
+    st.ray = NO_RAY;
+    st.hits = NO_HITS;
+    st.path = Path {
+        pixel,
+        index,
+        ..NO_PATH
+    };
+    st.result = NO_RESULT;
+    st.radiance_real = Vec3::ZERO;
+    st.first_hit = NO_FIRST_HIT;
+    st.first.kept = FIRST_NONE;
+    st.first.cone_probability = 0.0;
+    st.first.bsdf_probability = 0.0;
+    st.first.capture = POINT_NONE;
+    for point in &mut st.points {
+        point.strength = 0.0;
+    }
+    st.rays = SampleRays::default();
 }

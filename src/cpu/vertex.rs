@@ -328,7 +328,7 @@ fn plan_shadow(st: &mut PathState, s: &Surface, l: &LightSample, contribution: V
 }
 
 /// Roulette by the last number of a set.
-fn plays(u: &SampleSet, probability: f32) -> bool {
+pub fn plays(u: &SampleSet, probability: f32) -> bool {
     probability >= 1.0 || u.fourth() < probability
 }
 

@@ -3,6 +3,7 @@
 //! A direction that meets virtual geometry lies in at least one cone, so a mixture of uniform distributions over the cones covers all of (b) in
 //! docs/estimator.md. A sphere that subtends a wide cone, or contains the point, is replaced by the cosine-weighted hemisphere.
 
+use arrayvec::ArrayVec;
 use glam::Vec3;
 
 use crate::math::{PI, cross3, dot3, orthonormal_basis, safe_sqrt, sincos_2pi};
@@ -23,7 +24,7 @@ shared! {
     const COSINE_PADDING: f32 = 1e-6;
 
     /// One sphere seen from a point.
-    #[derive(Clone, Copy, Default)]
+    #[derive(Clone, Copy)]
     value struct Cone {
         /// Unit, to the centre.
         axis: Vec3,
@@ -82,8 +83,7 @@ fn cone_of(frame: &Frame, i: u32, position: Vec3, ns: Vec3) -> Cone {
 /// it has arithmetic to spare, but no memory.)
 #[derive(Default)]
 pub struct Cones {
-    cones: [Cone; MAX_SPHERES],
-    count: usize,
+    cones: ArrayVec<Cone, MAX_SPHERES>,
     ns: Vec3,
     /// Of the weights.
     total: f32,
@@ -92,13 +92,13 @@ pub struct Cones {
 /// Seen from `position` on a surface with the unit shading normal `ns`.
 pub fn cones_at(frame: &Frame, position: Vec3, ns: Vec3) -> Cones {
     let mut seen = Cones {
-        count: frame.sphere_count as usize,
         ns,
         ..Cones::default()
     };
-    for i in 0..seen.count {
-        seen.cones[i] = cone_of(frame, i as u32, position, ns);
-        seen.total += seen.cones[i].weight;
+    for i in 0..frame.sphere_count {
+        let cone = cone_of(frame, i, position, ns);
+        seen.total += cone.weight;
+        seen.cones.push(cone);
     }
     seen
 }
@@ -113,7 +113,7 @@ pub fn cone_sample(cones: &Cones, choice: f32, u: [f32; 2]) -> ConeSample {
     }
     let mut left = choice * cones.total;
     let mut chosen = cones.cones[0];
-    for cone in &cones.cones[..cones.count] {
+    for cone in &cones.cones {
         if cone.weight <= 0.0 {
             continue;
         }
@@ -142,7 +142,7 @@ pub fn cone_sample(cones: &Cones, choice: f32, u: [f32; 2]) -> ConeSample {
 /// Density of [`cone_sample`] in `direction` (unit).
 pub fn cone_pdf(cones: &Cones, direction: Vec3) -> f32 {
     let mut sum = 0.0;
-    for cone in &cones.cones[..cones.count] {
+    for cone in &cones.cones {
         if cone.wide {
             sum += cone.weight * dot3(direction, cones.ns).max(0.0) * (1.0 / PI);
         } else if inside(cone, direction) {

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::environment::{env_evaluate, env_radiance, env_sample};
 use super::rectangle::{rectangle_from, sample_rectangle};
 use crate::material::triangle_emission;
-use crate::math::{cross3, dot3, length3, safe_sqrt};
+use crate::math::{dot3, length3, safe_sqrt};
 use crate::packed::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light, NONE,
     PackedScene, SIDE_REAL, xyz,
@@ -126,20 +126,22 @@ fn sample_area_light(
         a = root * (1.0 - u1);
         b = root * u1;
     }
-    let mut to_light =
-        (xyz(light.position) - position) + (xyz(light.axis_u) * a + xyz(light.axis_v) * b);
-    if rectangle.solid_angle > 0.0 {
-        to_light = sample_rectangle(&rectangle, u0, u1);
-    }
+    let by_solid_angle = rectangle.solid_angle > 0.0;
+    let to_light = if by_solid_angle {
+        sample_rectangle(&rectangle, u0, u1)
+    } else {
+        (xyz(light.position) - position) + (xyz(light.axis_u) * a + xyz(light.axis_v) * b)
+    };
     let distance = length3(to_light);
     if distance <= 0.0 {
         return no_light();
     }
     let direction = to_light / distance;
-    let mut pdf = area_pdf(light, direction, distance);
-    if rectangle.solid_angle > 0.0 {
-        pdf = light.select_pdf / rectangle.solid_angle;
-    }
+    let pdf = if by_solid_angle {
+        light.select_pdf / rectangle.solid_angle
+    } else {
+        area_pdf(light, direction, distance)
+    };
     if pdf <= 0.0 {
         return no_light();
     }
@@ -160,8 +162,7 @@ fn sample_area_light(
 /// Density per solid angle, choice included, of drawing uniformly by area what lies on an area light along `direction` at `distance`; 0 from a quad's dark side.
 fn area_pdf(light: &Light, direction: Vec3, distance: f32) -> f32 {
     let area = light.radiance[3];
-    let normal = cross3(xyz(light.axis_u), xyz(light.axis_v));
-    let mut cos = -dot3(direction, normal) / length3(normal).max(1e-30);
+    let mut cos = -dot3(direction, xyz(light.normal)) / light.normal[3];
     if light.kind != LIGHT_QUAD {
         cos = cos.abs();
     }

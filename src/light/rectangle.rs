@@ -3,7 +3,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::math::{INV_TAU, TAU, atan2_, cross3, dot3, length3, safe_sqrt, sincos_2pi};
+use crate::math::{INV_TAU, TAU, atan2_, cross3, dot3, safe_sqrt, sincos_2pi};
 use crate::packed::{LIGHT_QUAD, Light, xyz};
 use crate::shared::shared;
 
@@ -41,11 +41,7 @@ pub fn is_right_angle(ex: Vec3, ey: Vec3) -> bool {
 
 /// The quad `light` from `position`; `solid_angle` 0 for other lights, oblique quads, the dark side and small solid angles.
 pub fn rectangle_from(light: &Light, position: Vec3) -> Rectangle {
-    let (axis_u, axis_v) = (xyz(light.axis_u), xyz(light.axis_v));
-    let width = length3(axis_u);
-    let depth = length3(axis_v);
-    let ex = axis_u / width;
-    let ey = axis_v / depth;
+    let (ex, ey) = (xyz(light.unit_u), xyz(light.unit_v));
     let ez = cross3(ex, ey);
     let offset = xyz(light.position) - position;
     let x0 = dot3(offset, ex);
@@ -55,9 +51,9 @@ pub fn rectangle_from(light: &Light, position: Vec3) -> Rectangle {
         ey,
         ez,
         x0,
-        x1: x0 + width,
+        x1: x0 + light.unit_u[3],
         y0,
-        y1: y0 + depth,
+        y1: y0 + light.unit_v[3],
         height: -dot3(offset, ez),
         solid_angle: 0.0,
         start: 0.0,

@@ -15,25 +15,6 @@ pub fn unit(v: Vec3) -> Vec3 {
     }
 }
 
-/// Unit normal of a triangle with edges `e1`, `e2`; `fallback` (unit) if it has no area in f32.
-pub fn triangle_normal(e1: Vec3, e2: Vec3, fallback: Vec3) -> Vec3 {
-    let a1 = e1.abs();
-    let a2 = e2.abs();
-    let m1 = a1.x.max(a1.y).max(a1.z);
-    let m2 = a2.x.max(a2.y).max(a2.z);
-    if m1 <= 1e-36 || m2 <= 1e-36 {
-        return fallback;
-    }
-    // Scaled first: the square of a millimetre triangle's cross product would underflow.
-    let n = cross3(e1 * (1.0 / m1), e2 * (1.0 / m2));
-    let length2 = n.dot(n);
-    if length2 > 1e-30 {
-        n * (1.0 / length2.sqrt())
-    } else {
-        fallback
-    }
-}
-
 /// Tangent along +u and the handedness of the bitangent, which runs along -v (glTF's v runs down, green runs up).
 /// w is 0 where the triangle's texture coordinates span no area.
 pub fn tangent_from_uv(e1: Vec3, e2: Vec3, d1: Vec2, d2: Vec2, normal: Vec3) -> Vec4 {

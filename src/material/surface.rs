@@ -4,17 +4,17 @@ use glam::{Vec2, Vec3, Vec4};
 
 use crate::accel::Hit;
 use crate::camera::lens::camera_project;
-use crate::math::{cross3, dot3, safe_sqrt};
+use crate::math::dot3;
 use crate::packed::{
     MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MATERIAL_LAMBERTIAN, MATERIAL_PHOTO_ALBEDO,
     MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED, MATERIAL_UNLIT, Material, NONE,
-    PHOTO_PATCHES, PackedScene, TEXTURE_UV1, Vertex, xyz,
+    PHOTO_PATCHES, PackedScene, TEXTURE_UV1, TRIANGLE_UNTINTED, Vertex, xyz,
 };
 use crate::shared::shared;
 
 use super::facets::{TABLE_SIZE, kept_by_facets};
 use super::ggx::{DELTA_ALPHA, transmits_unblurred};
-use super::normal::{mapped_normal, tangent_from_uv, triangle_normal, unit, valid_shading_normal};
+use super::normal::{mapped_normal, tangent_from_uv, unit, valid_shading_normal};
 use super::texture::{slot, slot_rgb, texture_sample};
 
 shared! {
@@ -22,10 +22,6 @@ shared! {
     const GAMMA_7: f32 = 4.172_327e-7;
     /// Bound on the absolute error of 1 - u - v for barycentrics in 0..1: two roundings of numbers of at most 1.
     const BARYCENTRIC_ERROR: f32 = 1.192_092_9e-7;
-    /// A triangle's weights are differences of products of two of its lengths, and four roundings of 2^-24 each.
-    const PLANE_ERROR: f32 = 2.384_185_8e-7;
-    /// Triangles slimmer than this (width over length) count as no slimmer: rays would leave them from too far off.
-    const SLIMMEST: f32 = 1e-4;
     /// Relative difference up to which a depth in `photo_albedo` is the point's own.
     const PHOTO_DEPTH_TOLERANCE: f32 = 0.02;
     /// Squared distances and weights below it are none.
@@ -215,21 +211,6 @@ fn perturbed(
     mapped_normal(normal, tangent, sample.truncate(), scale)
 }
 
-/// How far from its plane the tracer may find the triangle of these edges for a ray that starts near it: a sliver's weights, and with them the
-/// distance along the ray, are only as good as it is wide.
-fn plane_error(e1: Vec3, e2: Vec3) -> f32 {
-    let a1 = e1.abs();
-    let a2 = e2.abs();
-    let length = a1.x.max(a1.y).max(a1.z).max(a2.x.max(a2.y).max(a2.z));
-    if length <= 1e-36 {
-        return 0.0;
-    }
-    let inv = 1.0 / length;
-    let n = cross3(e1 * inv, e2 * inv);
-    let slimness = safe_sqrt(dot3(n, n)).max(SLIMMEST);
-    PLANE_ERROR * length / slimness
-}
-
 /// The shading point of a hit (not a miss) by a ray of unit direction `ray_direction`.
 pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface {
     let triangle = &scene.triangles[hit.triangle as usize];
@@ -247,16 +228,17 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
     let position_error = GAMMA_7 * (magnitude.x + magnitude.y + magnitude.z)
         + BARYCENTRIC_ERROR * (a0.x + a0.y + a0.z);
 
-    let e1 = p1 - p0;
-    let e2 = p2 - p0;
-    let error = position_error.max(plane_error(e1, e2));
+    let error = position_error.max(triangle.plane_error);
     let blended = unit(blend3(
         b,
         xyz(v0.normal_v0),
         xyz(v1.normal_v0),
         xyz(v2.normal_v0),
     ));
-    let outward = triangle_normal(e1, e2, blended);
+    let mut outward = Vec3::from(triangle.normal);
+    if outward == Vec3::ZERO {
+        outward = blended;
+    }
     let wo = -ray_direction;
     let front = wo.dot(outward) >= 0.0;
     let facing = if front { 1.0 } else { -1.0 };
@@ -269,12 +251,16 @@ pub fn surface_at(scene: &PackedScene, hit: Hit, ray_direction: Vec3) -> Surface
     };
 
     let flags = material.flags;
-    let color = blend4(
-        b,
-        Vec4::from(v0.color),
-        Vec4::from(v1.color),
-        Vec4::from(v2.color),
-    );
+    // What most triangles need not read, to the bit.
+    let mut color = Vec4::splat(b.x + b.y + b.z);
+    if triangle.flags & TRIANGLE_UNTINTED == 0 {
+        color = blend4(
+            b,
+            Vec4::from(v0.color),
+            Vec4::from(v1.color),
+            Vec4::from(v2.color),
+        );
+    }
     let mut base = Vec4::from(material.base_color) * color;
     let mut metallic = material.metallic;
     let mut roughness = material.roughness;

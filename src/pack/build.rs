@@ -373,11 +373,8 @@ impl PackedScene {
             > 0.0
         {
             self.triangles.push(Triangle {
-                vertices,
-                material,
                 light,
-                object,
-                pad: [0; 2],
+                ..Triangle::new(vertices, &self.vertices, material, object)
             });
         }
     }

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use crate::light::rectangle::is_right_angle;
 use crate::material::texture_sample;
-use crate::math::luminance;
+use crate::math::{cross3, length3, luminance};
 use crate::packed::{
     FRAME_LIGHTS_SUFFICE, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD,
     LIGHT_SPOT, LIGHT_TRIANGLE, Light, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT, Material, NONE,
@@ -56,6 +56,7 @@ pub(super) fn pack_lights(packed: &mut PackedScene, scene: &Scene) {
         powers.push(packed.env_mean_luminance * std::f64::consts::PI.powi(2) * radius * radius);
     }
     set_probabilities(&mut lights, &powers);
+    lights.iter_mut().for_each(set_edges);
     packed.frame.light_count = lights.len() as u32;
     packed.frame.flags &= !FRAME_LIGHTS_SUFFICE;
     if lights_suffice(&lights, &packed.materials) {
@@ -99,6 +100,9 @@ fn blank(kind: u32, side: u32) -> Light {
         position: [0.0; 4],
         axis_u: [0.0; 4],
         axis_v: [0.0; 4],
+        unit_u: [0.0; 4],
+        unit_v: [0.0; 4],
+        normal: [0.0, 0.0, 0.0, 1.0],
         radiance: [0.0; 4],
         kind,
         side,
@@ -109,6 +113,19 @@ fn blank(kind: u32, side: u32) -> Light {
         photon_pdf: 0.0,
         photon_cdf: 0.0,
     }
+}
+
+/// Fills what the record of an area light says about its edges: looked up at every draw.
+fn set_edges(light: &mut Light) {
+    if !matches!(light.kind, LIGHT_QUAD | LIGHT_TRIANGLE) {
+        return;
+    }
+    let (axis_u, axis_v) = (xyz(light.axis_u), xyz(light.axis_v));
+    let (width, depth) = (length3(axis_u), length3(axis_v));
+    let normal = cross3(axis_u, axis_v);
+    light.unit_u = (axis_u / width).extend(width).to_array();
+    light.unit_v = (axis_v / depth).extend(depth).to_array();
+    light.normal = normal.extend(length3(normal).max(1e-30)).to_array();
 }
 
 /// The record of a scene light, and its power estimate.

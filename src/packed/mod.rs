@@ -5,6 +5,7 @@
 
 pub(crate) mod materials;
 pub(crate) mod records;
+mod triangles;
 
 pub use materials::Material;
 pub use records::*;

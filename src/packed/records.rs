@@ -149,17 +149,26 @@ shared! {
         pub uv1: [f32; 4],
     }
 
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+    #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
     pub struct Triangle {
         /// Vertex indices.
         pub vertices: [u32; 3],
         pub material: u32,
+        /// Unit geometric normal, on the side on which the vertices run counter-clockwise; zero where that is lost in f32.
+        pub normal: [f32; 3],
+        /// How far from its plane the tracer may find the triangle, metres.
+        pub plane_error: f32,
         /// Index into the lights if the triangle emits and is sampled as a light, else NONE.
         pub light: u32,
         /// Index of the scene object; NONE for quad lights.
         pub object: u32,
-        pub pad: [u32; 2],
+        /// `TRIANGLE_*` bits.
+        pub flags: u32,
+        pub pad: u32,
     }
+
+    /// The vertices' colours are all 1.
+    pub const TRIANGLE_UNTINTED: u32 = 1;
 
     /// The material has no delta or glossy lobe and does not transmit: f = base colour / pi.
     pub const MATERIAL_LAMBERTIAN: u32 = 1;
@@ -221,6 +230,11 @@ shared! {
         pub axis_u: [f32; 4],
         /// edge_v, or third minus first vertex; w: cos of the spot's outer angle.
         pub axis_v: [f32; 4],
+        /// Quads and triangles: unit axis_u and axis_v; w: their lengths, metres.
+        pub unit_u: [f32; 4],
+        pub unit_v: [f32; 4],
+        /// Quads and triangles: axis_u x axis_v; w: its length, at least 1e-30. Of other lights 0, 0, 0 and 1.
+        pub normal: [f32; 4],
         /// Intensity, irradiance or radiance; w: area of quad or triangle.
         pub radiance: [f32; 4],
         /// `LIGHT_*`.

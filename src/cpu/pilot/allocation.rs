@@ -3,6 +3,8 @@
 //! A sample of squared error e that costs c and is taken m times a ray per pixel (m below 1: in turns) leaves the error e / m for the cost m c. For
 //! a given total error the total cost is least where m is proportional to the root of e / c (Neyman 1934, with costs).
 
+use std::ops::Add;
+
 use super::blocks::Blocks;
 use super::measurement::{BlockMoments, Moments};
 use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
@@ -162,12 +164,8 @@ fn least_gain(is_enough: impl Fn(f32) -> bool) -> f32 {
 
 /// Means over each block's neighbourhood; where nothing was sampled, no error at a cost of 1.
 fn smooth(blocks: &Blocks, moments: &[Moments]) -> Vec<Moments> {
-    let sum = |block, radius| {
-        blocks.gather(moments, block, radius, Moments::default(), |mut a, b| {
-            a += b;
-            a
-        })
-    };
+    let sum =
+        |block, radius| blocks.gather(moments, block, radius, Moments::default(), Moments::add);
     (0..blocks.count())
         .map(|block| {
             let near = sum(block, NEAR_BLOCKS);

@@ -11,7 +11,7 @@ use crate::cpu::estimator::{advance, begin_sample};
 use crate::cpu::request::answer;
 use crate::cpu::state::{
     DELTA_DENSITY, MODE_MIXED, PathState, STAGE_DONE, STAGE_PATH, STAGE_PRIMARY_REAL,
-    STAGE_PRIMARY_VIRTUAL,
+    STAGE_PRIMARY_VIRTUAL, path_state,
 };
 use crate::film::is_unusable;
 use crate::packed::{NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene};
@@ -65,7 +65,8 @@ fn squared_error(scene: &PackedScene, pixel: usize) -> Option<f32> {
 
 /// A sample of a pixel, until it scatters otherwise; none where the first surface is not a smooth virtual one.
 fn follow_smooth(scene: &PackedScene, pixel: u32, index: u32) -> Option<PathState> {
-    let mut state = begin_sample(scene, pixel, index, false);
+    let mut state = path_state(pixel, index);
+    begin_sample(scene, &mut state, pixel, index, false);
     while state.path.stage != STAGE_DONE {
         answer(scene, &mut state);
         if state.path.stage == STAGE_PRIMARY_VIRTUAL && state.hits.in_virtual.triangle == NONE {

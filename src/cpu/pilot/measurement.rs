@@ -34,11 +34,21 @@ pub struct Moments {
     pub cost: f32,
 }
 
+impl std::ops::Add for Moments {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            pixels: self.pixels + other.pixels,
+            error: self.error + other.error,
+            cost: self.cost + other.cost,
+        }
+    }
+}
+
 impl std::ops::AddAssign for Moments {
     fn add_assign(&mut self, other: Self) {
-        self.pixels += other.pixels;
-        self.error += other.error;
-        self.cost += other.cost;
+        *self = *self + other;
     }
 }
 
@@ -51,7 +61,8 @@ pub struct BlockMoments {
     pub near_share: f32,
 }
 
-/// Takes samples in some pixels of every block, with what they share; `done` hears of each. `scene.pixels` must ask for every sample's difference.
+/// Takes samples in some pixels of every square, with what they share; far from virtual geometry in every second square, as on a chessboard.
+/// `done` hears of each block. `scene.pixels` must ask for every sample's difference.
 pub fn measure(scene: &PackedScene, blocks: &Blocks, done: impl Fn() + Sync) -> Vec<BlockMoments> {
     let parts: Vec<_> = (blocks.squares(BLOCK_SIDE as usize))
         .into_par_iter()
@@ -86,11 +97,17 @@ fn measure_square(
         moments.entry(block).or_default().near_share += near;
     }
     let corner = square[0] as u32;
+    let width = scene.frame.width;
+    let (column, row) = (corner % width / BLOCK_SIDE, corner / width / BLOCK_SIDE);
+    if !any_near && (column + row) % 2 == 1 {
+        // Its neighbours' samples speak for it.
+        return;
+    }
     let first = hash_u32(hash_combine(scene.frame.seed, corner)) % TILES;
     // Diagonally opposite.
     let second = if any_near { TILES - 1 - first } else { first };
     let taken = |pixel: u32| {
-        let tile = tile_of(scene.frame.width, pixel) % TILES;
+        let tile = tile_of(width, pixel) % TILES;
         scene.pixels[pixel as usize].flags & PIXEL_OUT_OF_REACH == 0
             && (tile == first || tile == second)
     };

@@ -11,6 +11,8 @@ mod highlights;
 mod importance;
 mod measurement;
 
+use std::ops::Add;
+
 use rayon::prelude::*;
 
 use super::contribution::photons_traced;
@@ -22,6 +24,7 @@ use blocks::Blocks;
 #[cfg(feature = "bench")]
 pub(crate) use importance::MAX_LIGHTS_EXAMINED;
 use importance::{PilotLights, importance};
+use measurement::Moments;
 
 use crate::cpu::sharing::BLOCK_SIDE;
 use crate::packed::{
@@ -204,12 +207,19 @@ fn measure(
 /// What a sample in every pixel does.
 fn eye_moments(blocks: &Blocks, measured: &[measurement::BlockMoments]) -> EyeMoments {
     let mut sum = EyeMoments::default();
-    for (block, moments) in measured.iter().enumerate() {
-        let sampled = moments.difference.pixels + moments.mixed.pixels;
-        if sampled > 0.0 {
-            let share = blocks.pixels(block).count() as f64 / f64::from(sampled);
-            sum.error += share * f64::from(moments.difference.error + moments.mixed.error);
-            sum.cost += share * f64::from(moments.difference.cost + moments.mixed.cost);
+    let samples: Vec<Moments> = (measured.iter())
+        .map(|block| block.difference + block.mixed)
+        .collect();
+    for (block, &own) in samples.iter().enumerate() {
+        let moments = if own.pixels > 0.0 {
+            own
+        } else {
+            blocks.gather(&samples, block, 1, Moments::default(), Moments::add)
+        };
+        if moments.pixels > 0.0 {
+            let share = blocks.pixels(block).count() as f64 / f64::from(moments.pixels);
+            sum.error += share * f64::from(moments.error);
+            sum.cost += share * f64::from(moments.cost);
         }
     }
     sum

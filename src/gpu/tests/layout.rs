@@ -152,7 +152,7 @@ fn another_value_and_a_swapped_pair_of_fields_are_noticed() {
             "    side: u32,\n    kind: u32,\n",
             "Light",
         ),
-        ("    pad: vec2<u32>,\n", "", "Triangle"),
+        ("    plane_error: f32,\n", "", "Triangle"),
     ];
     for (from, to, name) in changed {
         let other = text.replacen(from, to, 1);

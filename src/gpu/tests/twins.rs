@@ -39,6 +39,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "is_regular newton undistort",
         "the proof, in f64, when a scene is read",
     ),
+    (
+        "cpu::state",
+        "renew",
+        "the CPU uses states again; a shader writes the parts that it needs",
+    ),
     ("cpu::vertex", "max_element", "glam has it"),
     (
         "material::facets",
@@ -142,10 +147,9 @@ const OTHER_ARGUMENTS: &[(&str, &str, &str)] = &[
         "path_state",
         "a shader's sample has a lane, where the parts of its state lie",
     ),
-    ("cpu::estimator", "begin_sample", "likewise"),
     (
         "cpu::sharing",
-        "link_points gather",
+        "link_probability link_points gather",
         "the CPU passes the members of a tile and what they have; a lane finds them",
     ),
     (

@@ -101,14 +101,8 @@ pub fn one_triangle(corners: [[f32; 3]; 3], material: Material) -> PackedScene {
         })
         .collect();
     let mut scene = PackedScene::empty();
-    scene.triangles = vec![Triangle {
-        vertices: [0, 1, 2],
-        material: 0,
-        light: NONE,
-        object: 7,
-        pad: [0; 2],
-    }];
     scene.vertices = vertices;
+    scene.triangles = vec![Triangle::new([0, 1, 2], &scene.vertices, 0, 7)];
     scene.materials = vec![material];
     scene
 }

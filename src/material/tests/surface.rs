@@ -275,6 +275,7 @@ fn opacity_follows_the_alpha_mode() {
         for vertex in &mut scene.vertices {
             vertex.color = [0.5, 1.0, 1.0, 0.9];
         }
+        scene.triangles = vec![Triangle::new([0, 1, 2], &scene.vertices, 0, 7)];
         let alpha = surface_alpha(&scene, hit(u, 0.1));
         let surface = surface_at(&scene, hit(u, 0.1), -Vec3::Z);
         assert!((surface.coverage - alpha).abs() < 1e-6);
@@ -434,13 +435,9 @@ pub fn gallery(random: &mut Random) -> PackedScene {
                 uv1: [random.uniform(), random.uniform(), 0.0, 0.0],
             });
         }
-        scene.triangles.push(Triangle {
-            vertices: [3 * id, 3 * id + 1, 3 * id + 2],
-            material: id,
-            light: NONE,
-            object: id % 5,
-            pad: [0; 2],
-        });
+        let vertices = [3 * id, 3 * id + 1, 3 * id + 2];
+        let triangle = Triangle::new(vertices, &scene.vertices, id, id % 5);
+        scene.triangles.push(triangle);
     }
     let (width, height) = (16, 12);
     scene.frame = Frame {
