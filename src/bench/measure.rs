@@ -8,7 +8,7 @@ use super::{Errors, Method, Row, Run, Truth};
 use crate::film::Picture;
 use crate::pack::PackError;
 use crate::renderer::{Budget, RayCounts, RenderError, Renderer, RendererOptions, Watcher};
-use crate::scene::{BackendChoice, Scene};
+use crate::scene::{BackendChoice, Combine, Scene};
 
 /// What to measure on a scene.
 #[derive(Clone, Debug)]
@@ -209,6 +209,7 @@ impl Subject {
         settings.estimator = method.estimator;
         settings.sampler = method.sampler;
         settings.composite = method.composite;
+        settings.combine = Combine::Mean;
         let options = RendererOptions {
             without: method.without.into_iter().collect(),
             filter: method.filter,

@@ -14,7 +14,8 @@ use crate::output::{
     write_text,
 };
 use crate::renderer::{
-    Budget, CameraNoise, ErrorGoal, Progress, Renderer, RendererOptions, SCRAMBLES, Stats, Watcher,
+    Budget, CameraNoise, Delivered, ErrorGoal, Progress, Renderer, RendererOptions, SCRAMBLES,
+    Stats, Watcher,
 };
 use crate::scene::{MotionBlurMethod, Overrides};
 use crate::stages::{GpuStages, finish};
@@ -190,7 +191,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     warn_of_non_finite(&renderer);
 
     let start = Instant::now();
-    write(
+    let moved = write(
         &renderer,
         &targets,
         job.flags.png_bits,
@@ -206,7 +207,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         write_text(path, &stats.to_json())?;
     }
     let aims = goal.is_some_and(|goal| !goal.takes_all_rays());
-    print(&summary::text(&renderer, &stats, &targets, aims))?;
+    print(&summary::text(&renderer, &stats, &targets, aims, moved))?;
     if job.range.is_some() && interrupted.is_set() {
         say("warning", "the range is not complete: it cannot be merged");
     }
@@ -217,17 +218,18 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     })
 }
 
-/// `film_range`: EXR files keep the film's sums, which are of these rays per pixel.
+/// `film_range`: EXR files keep the film's sums, which are of these rays per pixel. Gives [`Delivered::moved`].
 pub(super) fn write(
     renderer: &Renderer,
     targets: &[Target],
     png_bits: Option<PngBits>,
     frame: u32,
     film_range: Option<(u32, u32)>,
-) -> Result<(), Failure> {
+) -> Result<Option<f64>, Failure> {
     let gpu = renderer.gpu_device().cloned().map(GpuStages::new);
+    let Delivered { picture, moved } = renderer.delivered();
     let finished = finish(
-        renderer.picture(),
+        picture,
         renderer.film(),
         renderer.scene(),
         frame,
@@ -268,7 +270,7 @@ pub(super) fn write(
             }
         }
     }
-    Ok(())
+    Ok(moved)
 }
 
 /// Says that a saving was switched off in vain.

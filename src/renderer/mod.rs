@@ -48,6 +48,7 @@ pub use budget::Budget;
 pub use frames::FrameEdit;
 pub use goal::{CameraNoise, ErrorGoal};
 pub use picture_motion::PreviousView;
+pub use shown::Delivered;
 pub use skips::{Skip, Without};
 pub use stats::Stats;
 
@@ -177,7 +178,7 @@ impl Renderer {
         }
         needs::ensure_scene(&scene, options.all_planes)?;
         let packed = PackedScene::build(&scene, watcher)?;
-        needs::ensure_film(&packed, options.all_planes)?;
+        needs::ensure_film(&packed, options.all_planes, scene.settings.combine)?;
         let film = Film::new(
             packed.frame.width,
             packed.frame.height,

@@ -3,7 +3,20 @@
 use std::borrow::Cow;
 
 use super::Renderer;
-use crate::film::{Film, Picture, Planes, composite, estimated_error, filter_difference, planes};
+use super::core::Core;
+use crate::cpu::estimator::evaluations_before;
+use crate::film::{
+    Combined, Film, GROUPS, Picture, Planes, combine_robustly, composite, estimated_error,
+    filter_difference, group_counts, planes,
+};
+
+/// What is delivered of a film.
+#[derive(Clone, Debug)]
+pub struct Delivered {
+    pub picture: Picture,
+    /// Of the difference in real pixels, the share that the robust combination gave to other pixels nearby; `None` for means.
+    pub moved: Option<f64>,
+}
 
 impl Renderer {
     /// The film as pictures show it.
@@ -15,10 +28,45 @@ impl Renderer {
         }
     }
 
-    /// The film composited over the photograph.
+    /// The film composited over the photograph: means of the samples.
     pub fn picture(&self) -> Picture {
+        self.composited(&self.shown())
+    }
+
+    /// The picture as it is delivered: with the scene's combination of samples.
+    pub fn delivered(&self) -> Delivered {
+        let film = &self.core.film;
+        if self.core.options.filter || film.groups.is_empty() {
+            return Delivered {
+                picture: self.picture(),
+                moved: None,
+            };
+        }
+        let photo = self.core.scene.photo.as_ref();
+        let Combined { film, moved } =
+            combine_robustly(film, photo, |pixel| self.group_counts(pixel));
+        Delivered {
+            picture: self.composited(&film),
+            moved: Some(moved),
+        }
+    }
+
+    /// Evaluations of a pixel's difference, by group.
+    fn group_counts(&self, pixel: usize) -> [u32; GROUPS as usize] {
+        let Core { film, packed, .. } = &self.core;
+        let sums = &film.pixels[pixel];
+        if self.stated.is_some() {
+            return group_counts(0, sums.n / sums.sample_factor.max(1));
+        }
+        let first = film.first_index(pixel);
+        let [first, end] =
+            [first, first + sums.n].map(|index| evaluations_before(packed, pixel as u32, index));
+        group_counts(first, end)
+    }
+
+    fn composited(&self, film: &Film) -> Picture {
         composite(
-            &self.shown(),
+            film,
             self.core.scene.photo.as_ref(),
             self.core.scene.settings.composite,
         )

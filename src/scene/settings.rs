@@ -2,7 +2,7 @@
 
 use super::error::Result;
 use super::reader::{Choice, Node, Table};
-use super::{BackendChoice, Composite, Estimator, Exposure, SamplerKind, Settings, Side};
+use super::{BackendChoice, Combine, Composite, Estimator, Exposure, SamplerKind, Settings, Side};
 
 impl Choice for Side {
     const CHOICES: &'static [(&'static str, Self)] =
@@ -27,6 +27,11 @@ impl Choice for Composite {
         &[("additive", Self::Additive), ("quotient", Self::Quotient)];
 }
 
+impl Choice for Combine {
+    const CHOICES: &'static [(&'static str, Self)] =
+        &[("mean", Self::Mean), ("robust", Self::Robust)];
+}
+
 impl Choice for BackendChoice {
     const CHOICES: &'static [(&'static str, Self)] =
         &[("auto", Self::Auto), ("gpu", Self::Gpu), ("cpu", Self::Cpu)];
@@ -42,6 +47,7 @@ impl Default for Settings {
             estimator: Estimator::Direct,
             sampler: SamplerKind::Sobol,
             composite: Composite::Additive,
+            combine: Combine::Robust,
             backend: BackendChoice::Auto,
             exposure: Exposure::Ev(0.0),
         }
@@ -62,6 +68,7 @@ impl Settings {
         self.estimator = flags.estimator.unwrap_or(self.estimator);
         self.sampler = flags.sampler.unwrap_or(self.sampler);
         self.composite = flags.composite.unwrap_or(self.composite);
+        self.combine = flags.combine.unwrap_or(self.combine);
         self.backend = flags.backend.unwrap_or(self.backend);
     }
 }
@@ -77,6 +84,7 @@ pub struct Overrides {
     pub estimator: Option<Estimator>,
     pub sampler: Option<SamplerKind>,
     pub composite: Option<Composite>,
+    pub combine: Option<Combine>,
     pub backend: Option<BackendChoice>,
 }
 
@@ -88,6 +96,7 @@ const KEYS: &[&str] = &[
     "estimator",
     "sampler",
     "composite",
+    "combine",
     "backend",
 ];
 
@@ -111,6 +120,7 @@ pub(super) fn read_settings(root: &Table, exposure: Exposure) -> Result<Settings
             estimator: table.optional("estimator", |node| node.choice())?,
             sampler: table.optional("sampler", |node| node.choice())?,
             composite: table.optional("composite", |node| node.choice())?,
+            combine: table.optional("combine", |node| node.choice())?,
             backend: table.optional("backend", |node| node.choice())?,
         });
     }

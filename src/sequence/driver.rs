@@ -263,7 +263,7 @@ impl Sequence<'_> {
             return Ok(false);
         }
         let begin = Instant::now();
-        let picture = renderer.picture();
+        let picture = renderer.delivered().picture;
         self.seconds.composite += begin.elapsed().as_secs_f64();
         let copies = (renderer.scene().stages.motion_blur)
             .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);
