@@ -7,7 +7,7 @@ use crate::clock::ProcessorTime;
 use super::{Errors, Method, Row, Run, Truth};
 use crate::film::Picture;
 use crate::pack::PackError;
-use crate::renderer::{Budget, RayCounts, RenderError, Renderer, RendererOptions, Watcher};
+use crate::renderer::{Budget, Filter, RayCounts, RenderError, Renderer, RendererOptions, Watcher};
 use crate::scene::{BackendChoice, Combine, Scene};
 
 /// What to measure on a scene.
@@ -212,7 +212,7 @@ impl Subject {
         settings.combine = Combine::Mean;
         let options = RendererOptions {
             without: method.without.into_iter().collect(),
-            filter: method.filter,
+            filter: method.filter.then_some(Filter::Preview),
             ..RendererOptions::default()
         };
         let renderer = Renderer::new(scene, options, &Watcher::none())?;

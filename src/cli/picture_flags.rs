@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::Failure;
+use super::goal_flags::GoalFlags;
 use super::scene_flags::SceneFlags;
 use super::threads::ThreadsFlag;
 use super::values::{choice, png_bits, rays_per_pixel};
@@ -48,6 +49,8 @@ pub(super) struct PictureFlags {
     /// Write times and counts as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
+    #[command(flatten)]
+    pub goal: GoalFlags,
     #[command(flatten)]
     pub scene: SceneFlags,
     #[command(flatten)]

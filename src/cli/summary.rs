@@ -1,7 +1,7 @@
 //! The few lines that a render ends with.
 
 use crate::output::Target;
-use crate::renderer::{Renderer, SCRAMBLES, Stated, Stats};
+use crate::renderer::{Filter, Renderer, SCRAMBLES, Stated, Stats};
 
 /// `to_goal`: the render could end before its rays were spent. `moved`: by the robust combination.
 pub(super) fn text(
@@ -37,9 +37,15 @@ pub(super) fn text(
     };
     out += &lines(stats, &error);
     out += &moved.map(combination).unwrap_or_default();
-    if renderer.is_filtered() {
-        out += "filter  the difference on diffuse real surfaces is smoothed, a bias; the error is that before the filter\n";
-    }
+    out += match renderer.filter() {
+        Some(Filter::Preview) => {
+            "filter  the difference on diffuse real surfaces is smoothed, a bias; the error is that before the filter\n"
+        }
+        Some(Filter::Final) => {
+            "filter  the difference in real pixels is filtered, a bias; the error is that before the filter\n"
+        }
+        None => "",
+    };
     out
 }
 

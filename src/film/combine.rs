@@ -52,33 +52,37 @@ pub fn combine_robustly(
     photo: Option<&Photo>,
     counts: impl Fn(usize) -> [u32; DEVIATIONS] + Sync,
 ) -> Combined {
-    let divisor = |pixel: usize| match photo {
+    let shrunk = Shrunk::of(film, photo, counts);
+    with_difference(film, photo, |pixel| shrunk.taken[pixel])
+}
+
+/// What the photograph is divided into the difference of a pixel.
+pub(super) fn divisor(photo: Option<&Photo>, pixel: usize) -> Vec3 {
+    match photo {
         Some(photo) => Vec3::from(photo.linear[pixel]) + LEAST_PHOTO,
         None => Vec3::ONE,
-    };
-    let values: Vec<Values> = (0..film.pixels.len())
-        .into_par_iter()
-        .map(|pixel| match film.kind(pixel) {
-            PixelKind::Background => values_of(film, pixel, divisor(pixel), counts(pixel)),
-            PixelKind::Edge | PixelKind::Virtual | PixelKind::Skipped => [0.0; VALUES],
-        })
-        .collect();
-    let taken = shrunk(film.width as usize, values);
+    }
+}
 
+/// The film with what photons brought, less what is taken of each pixel's difference over the photograph.
+pub(super) fn with_difference(
+    film: &Film,
+    photo: Option<&Photo>,
+    taken: impl Fn(usize) -> Vec3 + Sync,
+) -> Combined {
     let mut out = film.clone();
     out.set_photons(false);
     out.set_groups(false);
-    let (moved, all) = out
-        .pixels
-        .par_iter_mut()
-        .enumerate()
+    let each = out.pixels.par_iter_mut().enumerate();
+    let (moved, all) = each
         .map(|(pixel, sums)| {
             *sums = film.sums(pixel);
-            if taken[pixel] == Vec3::ZERO {
-                return (0.0, magnitude(sums.diff.value()));
-            }
             let before = sums.diff.value();
-            let taken = (taken[pixel] * divisor(pixel)).as_dvec3() * f64::from(sums.n);
+            let taken = taken(pixel);
+            if taken == Vec3::ZERO {
+                return (0.0, magnitude(before));
+            }
+            let taken = (taken * divisor(photo, pixel)).as_dvec3() * f64::from(sums.n);
             sums.diff = Sum3::from(before - taken);
             (magnitude(taken), magnitude(before))
         })
@@ -145,28 +149,65 @@ fn deviations(
     })
 }
 
-/// What each pixel is to lose of its difference; negative where it gains.
-fn shrunk(width: usize, values: Vec<Values>) -> Vec<Vec3> {
-    let mut taken = vec![Vec3::ZERO; values.len()];
-    let mut fine = values;
-    for band in 0..BANDS {
-        let step = 1 << band;
-        let coarse = smoothed(&fine, width, step);
-        // Band, squared error of its mean, weight.
-        let powers: Vec<[f32; 3]> = (fine.par_iter().zip(&coarse))
-            .map(|(fine, coarse)| powers(fine, coarse))
-            .collect();
-        let powers = smoothed(&powers, width, step);
-        (taken.par_iter_mut().zip(&powers))
-            .zip(fine.par_iter().zip(&coarse))
-            .for_each(|((taken, &[power, error, weight]), (fine, coarse))| {
-                if weight > 0.0 && error > 0.0 {
-                    *taken += (error / power).min(1.0) * difference(fine, coarse);
+/// The differences of a film's pixels over the photograph, and what the robust combination makes of them. All 0 where a pixel takes no part.
+pub(super) struct Shrunk {
+    pub difference: Vec<Vec3>,
+    /// To be lost; negative where a pixel gains.
+    pub taken: Vec<Vec3>,
+    /// Variance of the difference's brightness, by the groups of the pixels around; 0 also where a pixel takes no part.
+    pub variance: Vec<f32>,
+    pub takes_part: Vec<bool>,
+}
+
+impl Shrunk {
+    /// As [`combine_robustly`].
+    pub fn of(
+        film: &Film,
+        photo: Option<&Photo>,
+        counts: impl Fn(usize) -> [u32; DEVIATIONS] + Sync,
+    ) -> Self {
+        let values: Vec<Values> = (0..film.pixels.len())
+            .into_par_iter()
+            .map(|pixel| match film.kind(pixel) {
+                PixelKind::Background => {
+                    values_of(film, pixel, divisor(photo, pixel), counts(pixel))
                 }
-            });
-        fine = coarse;
+                PixelKind::Edge | PixelKind::Virtual | PixelKind::Skipped => [0.0; VALUES],
+            })
+            .collect();
+        let mut shrunk = Self {
+            difference: values.iter().map(|v| Vec3::from_slice(v)).collect(),
+            taken: vec![Vec3::ZERO; values.len()],
+            variance: Vec::new(),
+            takes_part: values.iter().map(|v| v[VALUES - 1] > 0.0).collect(),
+        };
+        shrunk.shrink(film.width as usize, values);
+        shrunk
     }
-    taken
+
+    fn shrink(&mut self, width: usize, values: Vec<Values>) {
+        let mut fine = values;
+        for band in 0..BANDS {
+            let step = 1 << band;
+            let coarse = smoothed(&fine, width, step);
+            // Band, squared error of its mean, weight.
+            let powers: Vec<[f32; 3]> = (fine.par_iter().zip(&coarse))
+                .map(|(fine, coarse)| powers(fine, coarse))
+                .collect();
+            let powers = smoothed(&powers, width, step);
+            (self.taken.par_iter_mut().zip(&powers))
+                .zip(fine.par_iter().zip(&coarse))
+                .for_each(|((taken, &[power, error, weight]), (fine, coarse))| {
+                    if weight > 0.0 && error > 0.0 {
+                        *taken += (error / power).min(1.0) * difference(fine, coarse);
+                    }
+                });
+            if band == 0 {
+                self.variance = smoothed(&powers, width, 1).iter().map(|p| p[1]).collect();
+            }
+            fine = coarse;
+        }
+    }
 }
 
 fn difference(fine: &Values, coarse: &Values) -> Vec3 {

@@ -5,6 +5,7 @@ mod combine;
 mod compare;
 mod composite;
 mod filter;
+mod final_filter;
 mod flip;
 pub(crate) mod groups;
 mod pools;
@@ -23,6 +24,7 @@ pub use composite::{
     variance,
 };
 pub use filter::{RealSurface, filter_difference};
+pub use final_filter::filter_finally;
 pub use flip::{flip, flip_map};
 pub use groups::{GROUPS, GroupSums, group_add};
 pub use pools::pooled;

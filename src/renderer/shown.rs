@@ -2,12 +2,12 @@
 
 use std::borrow::Cow;
 
-use super::Renderer;
 use super::core::Core;
+use super::{Filter, Renderer};
 use crate::cpu::estimator::evaluations_before;
 use crate::film::{
     Combined, Film, GROUPS, Picture, Planes, combine_robustly, composite, estimated_error,
-    filter_difference, group_counts, planes,
+    filter_difference, filter_finally, group_counts, planes,
 };
 
 /// What is delivered of a film.
@@ -21,7 +21,7 @@ pub struct Delivered {
 impl Renderer {
     /// The film as pictures show it.
     fn shown(&self) -> Cow<'_, Film> {
-        if self.core.options.filter {
+        if self.core.options.filter == Some(Filter::Preview) {
             Cow::Owned(filter_difference(&self.core.film, &self.surfaces))
         } else {
             Cow::Borrowed(&self.core.film)
@@ -33,22 +33,23 @@ impl Renderer {
         self.composited(&self.shown())
     }
 
-    /// The picture as it is delivered: with the scene's combination of samples.
+    /// The picture as it is delivered: with the scene's combination of samples, or filtered.
     pub fn delivered(&self) -> Delivered {
         let film = &self.core.film;
-        if self.core.options.filter || film.groups.is_empty() {
-            return Delivered {
-                picture: self.picture(),
-                moved: None,
-            };
-        }
         let photo = self.core.scene.photo.as_ref();
-        let Combined { film, moved } =
-            combine_robustly(film, photo, |pixel| self.group_counts(pixel));
-        Delivered {
-            picture: self.composited(&film),
-            moved: Some(moved),
-        }
+        let counts = |pixel| self.group_counts(pixel);
+        let (picture, moved) = match self.core.options.filter {
+            Some(Filter::Final) => {
+                let film = filter_finally(film, photo, &self.surfaces, counts);
+                (self.composited(&film), None)
+            }
+            None if !film.groups.is_empty() => {
+                let Combined { film, moved } = combine_robustly(film, photo, counts);
+                (self.composited(&film), Some(moved))
+            }
+            Some(Filter::Preview) | None => (self.picture(), None),
+        };
+        Delivered { picture, moved }
     }
 
     /// Evaluations of a pixel's difference, by group.
