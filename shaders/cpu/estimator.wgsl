@@ -42,6 +42,11 @@ fn turn_offset(pixel: u32, period: u32) -> u32 {
     return hash_u32(hash_combine(frame.seed ^ TURN_SALT, taking_turns)) % period;
 }
 
+fn evaluation(pixel: u32, index: u32) -> u32 {
+    @if(paper) { return index; }
+    @else { return difference_turn(pixel, index); }
+}
+
 fn begin_sample(lane: u32, pixel: u32, index: u32, is_real_pass: bool) -> PathState {
     var st = path_state(lane, pixel, index);
     let may_meet_virtual = (pixels[pixel].flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u;

@@ -3,12 +3,14 @@
 
 import package::gpu::buffers::frame;
 import package::shared::WORKGROUP;
-import package::cpu::estimator::{advance, begin_sample};
+import package::cpu::estimator::{advance, begin_sample, evaluation};
+import package::film::groups::group_add;
 import package::film::sums::{guide_add, pixel_add, pixel_add_real};
 import package::gpu::lanes::{
-    add_rays, append, batch, counters, guide_sums, indirect, pixel_sums, queue_in, work,
+    add_rays, append, batch, counters, group_sums, guide_sums, indirect, pixel_sums, queue_in, work,
     COUNT_IN, COUNT_OUT, COUNT_STEPS,
 };
+import package::shared::NONE;
 import package::cpu::request::answer;
 import package::work::rays::SampleRays;
 import package::cpu::state::{
@@ -134,6 +136,7 @@ fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>) {
                 if batch.real_pass == 0u && path_firsts[lane].kept != FIRST_NONE { found += gather(lane); }
             }
             let radiance = found * frame.exposure_scale;
+            var contribution = radiance;
             if batch.real_pass != 0u {
                 sums = pixel_add_real(sums, index, is_virtual, radiance, zero);
             } else {
@@ -141,7 +144,6 @@ fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>) {
                     let real = path_radiances_real[lane] * frame.exposure_scale;
                     // Later samples leave a gap in the real pass, which is replayed, once one was left out.
                     let real_is_next = sums.n_real == sums.n;
-                    var contribution = radiance;
                     if !is_virtual {
                         contribution = (result.radiance - path_radiances_real[lane]) * frame.exposure_scale;
                     }
@@ -152,6 +154,10 @@ fn kernel_accumulate(@builtin(global_invocation_id) id: vec3<u32>) {
                 }
                 @else {
                     sums = pixel_add(sums, index, is_virtual, radiance, zero);
+                }
+                let number = evaluation(item.pixel, index);
+                if batch.with_groups != 0u && !is_virtual && number != NONE {
+                    group_sums[slot] = group_add(group_sums[slot], number, contribution, zero);
                 }
                 if batch.with_guides != 0u && path_first_hits[lane].depth_m < FAR {
                     let hit = path_first_hits[lane];

@@ -2,6 +2,7 @@
 
 import package::work::list::PixelWork;
 import package::work::rays::SampleRays;
+import package::film::groups::GroupSums;
 import package::film::sums::{PixelSums, GuideSums};
 
 @group(1) @binding(0) var<uniform> batch: Batch;
@@ -14,6 +15,7 @@ import package::film::sums::{PixelSums, GuideSums};
 // By slot.
 @group(1) @binding(6) var<storage, read_write> pixel_sums: array<PixelSums>;
 @group(1) @binding(7) var<storage, read_write> guide_sums: array<GuideSums>;
+@group(1) @binding(8) var<storage, read_write> group_sums: array<GroupSums>;
 
 var<workgroup> appended: atomic<u32>;
 var<workgroup> first_place: u32;

@@ -7,8 +7,8 @@ use crate::clock::ProcessorTime;
 use super::{Errors, Method, Row, Run, Truth};
 use crate::film::Picture;
 use crate::pack::PackError;
-use crate::renderer::{Budget, RayCounts, RenderError, Renderer, RendererOptions, Watcher};
-use crate::scene::{BackendChoice, Scene};
+use crate::renderer::{Budget, Filter, RayCounts, RenderError, Renderer, RendererOptions, Watcher};
+use crate::scene::{BackendChoice, Combine, Scene};
 
 /// What to measure on a scene.
 #[derive(Clone, Debug)]
@@ -209,9 +209,10 @@ impl Subject {
         settings.estimator = method.estimator;
         settings.sampler = method.sampler;
         settings.composite = method.composite;
+        settings.combine = Combine::Mean;
         let options = RendererOptions {
             without: method.without.into_iter().collect(),
-            filter: method.filter,
+            filter: method.filter.then_some(Filter::Preview),
             ..RendererOptions::default()
         };
         let renderer = Renderer::new(scene, options, &Watcher::none())?;

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use glam::{DMat4, DVec3};
 
 use crate::scene::{
-    Aperture, Backdrop, BackendChoice, Camera, Composite, Estimator, Exposure, Instance, Lens,
-    Material, Object, Primitive, SamplerKind, Scene, Settings, Side, Stages,
+    Aperture, Backdrop, BackendChoice, Camera, Combine, Composite, Estimator, Exposure, Instance,
+    Lens, Material, Object, Primitive, SamplerKind, Scene, Settings, Side, Stages,
 };
 
 /// A scene of these objects, seen by a pinhole, one interaction before the light.
@@ -38,6 +38,7 @@ pub(super) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -
             estimator: Estimator::Direct,
             sampler: SamplerKind::Sobol,
             composite: Composite::Additive,
+            combine: Combine::Mean,
             backend: BackendChoice::Cpu,
             multiple_scattering: false,
             exposure: Exposure::Ev(0.0),

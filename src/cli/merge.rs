@@ -7,6 +7,7 @@ use clap::Args;
 use super::progress::Bar;
 use super::render::write;
 use super::scene_flags::SceneFlags;
+use super::summary::combination;
 use super::values::png_bits;
 use super::{Failure, Outcome, print, say};
 use crate::film::Film;
@@ -82,7 +83,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     )?;
     drop(bar);
     let complete = range == (0, total);
-    write(
+    let moved = write(
         &renderer,
         &targets,
         arguments.png_bits,
@@ -98,6 +99,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             range.1
         );
     }
+    out += &moved.map(combination).unwrap_or_default();
     print(&out)?;
     Ok(Outcome::Done)
 }

@@ -8,6 +8,7 @@ mod antialias;
 mod bench;
 mod cartoon;
 mod compare;
+mod goal_flags;
 mod info;
 mod interrupt;
 mod layers;
@@ -26,6 +27,7 @@ mod terminal;
 mod threads;
 mod values;
 
+use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -83,7 +85,8 @@ pub fn run() -> ExitCode {
 
 fn run_command() -> ExitCode {
     interrupt::survive_file_limits();
-    let arguments = Arguments::try_parse().unwrap_or_else(|error| end_with_usage(error));
+    let arguments = Arguments::try_parse_from(words(std::env::args_os()))
+        .unwrap_or_else(|error| end_with_usage(error));
     files::guard_run();
     let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
@@ -111,6 +114,18 @@ fn run_command() -> ExitCode {
     }
 }
 
+/// The words of a command line. What follows `--filter` is its value only if it is `final`, so that a scene may follow as well.
+fn words(given: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let mut words: Vec<OsString> = Vec::new();
+    for word in given {
+        match words.last_mut() {
+            Some(last) if last == "--filter" && word == "final" => last.push("=final"),
+            _ => words.push(word),
+        }
+    }
+    words
+}
+
 /// For commands without a flag for it.
 fn all_threads() -> Result<(), Failure> {
     pool::start(None)
@@ -129,9 +144,38 @@ fn read_photo(path: &Path) -> Result<Photo, Failure> {
 /// Help, or why the command line cannot be used. Names of files stand in it too: clap takes control sequences out of what it quotes, so
 /// that it is given them escaped.
 fn end_with_usage(error: clap::Error) -> ! {
-    let words = std::env::args_os().map(|word| terminal::escaped(&word.to_string_lossy()));
-    Arguments::try_parse_from(words)
+    let words = words(std::env::args_os()).into_iter();
+    Arguments::try_parse_from(words.map(|word| terminal::escaped(&word.to_string_lossy())))
         .err()
         .unwrap_or(error)
         .exit()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_filter_takes_its_name_and_no_scene() {
+        let filter = |line: &str| {
+            let line = words(line.split(' ').map(OsString::from));
+            match Arguments::try_parse_from(line).map(|arguments| arguments.command) {
+                Ok(Command::Render(arguments)) => Some(arguments.filter()),
+                _ => None,
+            }
+        };
+        use crate::renderer::Filter::{Final, Preview};
+        assert_eq!(filter("mixray render a.toml"), Some(None));
+        assert_eq!(filter("mixray render --filter a.toml"), Some(Some(Preview)));
+        assert_eq!(
+            filter("mixray render a.toml --filter final"),
+            Some(Some(Final))
+        );
+        assert_eq!(
+            filter("mixray render --filter=final a.toml"),
+            Some(Some(Final))
+        );
+        assert_eq!(filter("mixray render --filter=none a.toml"), None);
+        assert_eq!(filter("mixray render --filter --range 0..2 a.toml"), None);
+    }
 }

@@ -5,12 +5,15 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::Failure;
+use super::goal_flags::GoalFlags;
 use super::scene_flags::SceneFlags;
 use super::threads::ThreadsFlag;
 use super::values::{choice, png_bits, rays_per_pixel};
 use crate::output::PngBits;
 use crate::renderer::{Skip, Without};
-use crate::scene::{BackendChoice, Composite, Estimator, Overrides, SamplerKind, Settings};
+use crate::scene::{
+    BackendChoice, Combine, Composite, Estimator, Overrides, SamplerKind, Settings,
+};
 
 #[derive(Debug, Args)]
 pub(super) struct PictureFlags {
@@ -31,6 +34,9 @@ pub(super) struct PictureFlags {
     /// quotient cancels an error in the proxy's albedo or the overall light
     #[arg(long, value_parser = choice::<Composite>())]
     composite: Option<Composite>,
+    /// Of the samples on real surfaces, for the picture alone; robust spreads rare bright ones over their neighbourhood [default: robust]
+    #[arg(long, value_parser = choice::<Combine>())]
+    combine: Option<Combine>,
     /// Surface interactions before the light; 1 is direct light only
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_BOUNCES)))]
     max_bounces: Option<u32>,
@@ -43,6 +49,8 @@ pub(super) struct PictureFlags {
     /// Write times and counts as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
+    #[command(flatten)]
+    pub goal: GoalFlags,
     #[command(flatten)]
     pub scene: SceneFlags,
     #[command(flatten)]
@@ -59,6 +67,7 @@ impl PictureFlags {
             estimator: self.estimator,
             sampler: self.sampler,
             composite: self.composite,
+            combine: self.combine,
             backend: self.backend,
         }
     }

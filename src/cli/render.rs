@@ -7,14 +7,14 @@ use clap::Args;
 
 use super::picture_flags::PictureFlags;
 use super::progress::Bar;
-use super::values::{above_zero, camera_noise, whole_range};
+use super::values::whole_range;
 use super::{Failure, Outcome, interrupt, print, say, summary};
 use crate::output::{
     FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr, write_film, write_png,
     write_text,
 };
 use crate::renderer::{
-    Budget, CameraNoise, ErrorGoal, Progress, Renderer, RendererOptions, SCRAMBLES, Stats, Watcher,
+    Budget, Delivered, Goal, Progress, Renderer, RendererOptions, Stats, Watcher,
 };
 use crate::scene::{MotionBlurMethod, Overrides};
 use crate::stages::{GpuStages, finish};
@@ -32,22 +32,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     flags: PictureFlags,
     /// Render only these of each pixel's rays, FROM to TO - 1, into an .exr that `mixray merge` puts together with the others
-    #[arg(long, value_name = "FROM..TO", value_parser = whole_range)]
+    #[arg(long, value_name = "FROM..TO", value_parser = whole_range, conflicts_with_all = ["target_error", "stop_at", "filter"])]
     range: Option<(u32, u32)>,
-    /// Render until the standard error of the composite is down to this, root mean square over each tile of 16 x 16 pixels, linear;
-    /// --rpp then limits the rays of a pixel [default: 16384]
-    #[arg(long, value_name = "E", value_parser = above_zero, conflicts_with = "range")]
-    target_error: Option<f64>,
-    /// camera-noise: render until the variance of the composite is no more than that of the camera's noise
-    #[arg(long, value_name = "WHEN", value_parser = ["camera-noise"], conflicts_with = "range")]
-    stop_at: Option<String>,
-    /// The camera's noise: a file of `mixray noise calibrate`, or sigma^2 = A y + B in 8-bit code values y of the encoded picture
-    /// [default: the profile of the scene's [noise]]
-    #[arg(long, value_name = "NOISE.toml|A,B", requires = "stop_at")]
-    camera_noise: Option<String>,
-    /// Smooth what virtual objects change on diffuse real surfaces, for previews of a few rays per pixel: biased
-    #[arg(long, conflicts_with = "range")]
-    filter: bool,
     /// Frame number of a video: with [noise], every frame has its own
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
@@ -63,13 +49,15 @@ pub(super) struct Job {
     overrides: Overrides,
     frame: u32,
     range: Option<(u32, u32)>,
-    goal: Option<ErrorGoal>,
-    /// The goal is the camera's noise, which the scene tells.
-    noise_of_scene: bool,
-    filter: bool,
+    goal: Option<Goal>,
 }
 
 impl Arguments {
+    #[cfg(test)]
+    pub(super) fn filter(&self) -> Option<crate::renderer::Filter> {
+        self.flags.goal.filter
+    }
+
     pub(super) fn check(self) -> Result<Job, Failure> {
         let targets: Vec<Target> = self
             .output
@@ -84,11 +72,9 @@ impl Arguments {
                 "--range wants an .exr to write (-o part.exr): other pictures do not keep the film";
             return Err(Failure(message.to_owned()));
         }
-        let goal = self.goal()?;
+        let goal = self.flags.goal.goal(self.flags.rpp)?;
         Ok(Job {
-            noise_of_scene: self.stop_at.is_some() && self.camera_noise.is_none(),
             goal,
-            filter: self.filter,
             scene: self.scene,
             targets,
             overrides: Overrides {
@@ -103,27 +89,6 @@ impl Arguments {
     }
 }
 
-impl Arguments {
-    fn goal(&self) -> Result<Option<ErrorGoal>, Failure> {
-        if self.target_error.is_none() && self.stop_at.is_none() {
-            return Ok(None);
-        }
-        if self.flags.rpp.is_some_and(|rpp| rpp < SCRAMBLES) {
-            return Err(Failure(format!(
-                "--rpp limits the rays of a pixel here: the error is taken from {SCRAMBLES} renders, each of one ray or more"
-            )));
-        }
-        Ok(Some(ErrorGoal {
-            standard_error: self.target_error,
-            noise: self.camera_noise.as_deref().map(camera_noise).transpose()?,
-            max_rays_per_pixel: self
-                .flags
-                .rpp
-                .unwrap_or(ErrorGoal::DEFAULT_MAX_RAYS_PER_PIXEL),
-        }))
-    }
-}
-
 pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     job.flags.start_threads()?;
     let start = Instant::now();
@@ -134,18 +99,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let bar = Bar::new("reading the scene", unit);
     let mut scene = job.flags.scene.load(&job.scene)?;
     scene.settings.apply(&job.overrides);
-    let mut goal = job.goal;
-    if let Some(goal) = goal.as_mut().filter(|_| job.noise_of_scene) {
-        let Some(noise) = &scene.stages.noise else {
-            return Err(Failure(format!(
-                "{} has no [noise]: --stop-at camera-noise wants --camera-noise NOISE.toml or A,B",
-                job.scene.display()
-            )));
-        };
-        goal.noise = Some(CameraNoise {
-            fit: noise.profile.fit,
-        });
-    }
+    let goal = job.goal.map(|goal| goal.of(&scene)).transpose()?;
     bar.aside(|| {
         for warning in &scene.warnings {
             say("warning", warning);
@@ -164,7 +118,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         all_planes: targets.iter().any(|t| t.format() == Format::Exr),
         sample_range: job.range,
         without: job.flags.without(),
-        filter: job.filter,
+        filter: job.flags.goal.filter,
     };
     let hear = |progress: &Progress| bar.hear(progress);
     let watcher = Watcher::none().heard_by(&hear);
@@ -190,7 +144,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     warn_of_non_finite(&renderer);
 
     let start = Instant::now();
-    write(
+    let moved = write(
         &renderer,
         &targets,
         job.flags.png_bits,
@@ -206,7 +160,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         write_text(path, &stats.to_json())?;
     }
     let aims = goal.is_some_and(|goal| !goal.takes_all_rays());
-    print(&summary::text(&renderer, &stats, &targets, aims))?;
+    print(&summary::text(&renderer, &stats, &targets, aims, moved))?;
     if job.range.is_some() && interrupted.is_set() {
         say("warning", "the range is not complete: it cannot be merged");
     }
@@ -217,17 +171,18 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     })
 }
 
-/// `film_range`: EXR files keep the film's sums, which are of these rays per pixel.
+/// `film_range`: EXR files keep the film's sums, which are of these rays per pixel. Gives [`Delivered::moved`].
 pub(super) fn write(
     renderer: &Renderer,
     targets: &[Target],
     png_bits: Option<PngBits>,
     frame: u32,
     film_range: Option<(u32, u32)>,
-) -> Result<(), Failure> {
+) -> Result<Option<f64>, Failure> {
     let gpu = renderer.gpu_device().cloned().map(GpuStages::new);
+    let Delivered { picture, moved } = renderer.delivered();
     let finished = finish(
-        renderer.picture(),
+        picture,
         renderer.film(),
         renderer.scene(),
         frame,
@@ -268,7 +223,7 @@ pub(super) fn write(
             }
         }
     }
-    Ok(())
+    Ok(moved)
 }
 
 /// Says that a saving was switched off in vain.

@@ -12,6 +12,7 @@ use super::values::whole_range;
 use super::{Failure, Outcome, interrupt, print, say};
 use crate::output::{check_writable, write_text};
 use crate::renderer::Watcher;
+use crate::scene::Overrides;
 use crate::scene::trajectory::FORMATS;
 use crate::sequence::{Event, RenderedSequence, SequenceOptions, check_poses, render_sequence};
 
@@ -67,10 +68,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 }
 
 impl Arguments {
-    fn options(&self) -> SequenceOptions {
-        SequenceOptions {
+    fn options(&self) -> Result<SequenceOptions, Failure> {
+        let goal = self.flags.goal.goal(self.flags.rpp)?;
+        Ok(SequenceOptions {
             scene: self.scene.clone(),
-            overrides: self.flags.overrides(),
+            overrides: Overrides {
+                // With a goal it is a limit, and not what the pilot plans for.
+                rays_per_pixel: self.flags.rpp.filter(|_| goal.is_none()),
+                ..self.flags.overrides()
+            },
+            goal,
+            filter: self.flags.goal.filter,
             without: self.flags.without(),
             frames: self.frames.clone(),
             trajectory: self.trajectory.clone(),
@@ -83,12 +91,12 @@ impl Arguments {
             overwrite: self.overwrite,
             png_bits: self.flags.png_bits,
             sandbox: self.flags.scene.sandbox,
-        }
+        })
     }
 }
 
 fn check(arguments: &Arguments, points: Option<&Path>) -> Result<Outcome, Failure> {
-    let reprojection = check_poses(&arguments.options(), points, &tell)?;
+    let reprojection = check_poses(&arguments.options()?, points, &tell)?;
     print(&reprojection.text)?;
     Ok(match reprojection.worst_px <= arguments.max_error {
         true => Outcome::Done,
@@ -97,7 +105,7 @@ fn check(arguments: &Arguments, points: Option<&Path>) -> Result<Outcome, Failur
 }
 
 fn render(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let options = arguments.options();
+    let options = arguments.options()?;
     if let Some(path) = &arguments.flags.stats {
         check_writable(path)?;
     }

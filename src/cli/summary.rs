@@ -1,14 +1,15 @@
 //! The few lines that a render ends with.
 
 use crate::output::Target;
-use crate::renderer::{Renderer, SCRAMBLES, Stated, Stats};
+use crate::renderer::{Filter, Renderer, SCRAMBLES, Stated, Stats};
 
-/// `to_goal`: the render could end before its rays were spent.
+/// `to_goal`: the render could end before its rays were spent. `moved`: by the robust combination.
 pub(super) fn text(
     renderer: &Renderer,
     stats: &Stats,
     targets: &[Target],
     to_goal: bool,
+    moved: Option<f64>,
 ) -> String {
     let film = renderer.film();
     let rays = match renderer.stated() {
@@ -41,10 +42,25 @@ pub(super) fn text(
             100.0 * share
         );
     }
-    if renderer.is_filtered() {
-        out += "filter  the difference on diffuse real surfaces is smoothed, a bias; the error is that before the filter\n";
-    }
+    out += &moved.map(combination).unwrap_or_default();
+    out += match renderer.filter() {
+        Some(Filter::Preview) => {
+            "filter  the difference on diffuse real surfaces is smoothed, a bias; the error is that before the filter\n"
+        }
+        Some(Filter::Final) => {
+            "filter  the difference in real pixels is filtered, a bias; the error is that before the filter\n"
+        }
+        None => "",
+    };
     out
+}
+
+/// How much light the robust combination took.
+pub(super) fn combination(moved: f64) -> String {
+    format!(
+        "combine {:.2}% of the change in real pixels was noise, and is spread over their neighbourhood (--combine mean leaves it)\n",
+        100.0 * moved
+    )
 }
 
 fn from_scrambles(stated: &Stated, to_goal: bool) -> String {

@@ -58,6 +58,23 @@ fn turn_offset(scene: &PackedScene, pixel: u32, period: u32) -> u32 {
     hash_u32(hash_combine(scene.frame.seed ^ TURN_SALT, taking_turns)) % period
 }
 
+/// The number of the sample among those that evaluate the difference, or NONE if it does not.
+pub fn evaluation(scene: &PackedScene, pixel: u32, index: u32) -> u32 {
+    if scene.frame.estimator == ESTIMATOR_PAPER {
+        return index;
+    }
+    difference_turn(scene, pixel, index)
+}
+
+/// Evaluations of the difference among a pixel's samples before this one.
+pub fn evaluations_before(scene: &PackedScene, pixel: u32, index: u32) -> u32 {
+    let period = scene.pixels[pixel as usize].difference_period;
+    if period <= 1 || scene.frame.estimator == ESTIMATOR_PAPER {
+        return index;
+    }
+    (index + turn_offset(scene, pixel, period)) / period
+}
+
 /// Whether the sample is known to add nothing before its ray is even made.
 pub fn is_without_turn(scene: &PackedScene, pixel: u32, index: u32) -> bool {
     let info = &scene.pixels[pixel as usize];

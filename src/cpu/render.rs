@@ -4,12 +4,12 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::batch::{Batch, run_alone};
-use super::estimator::{begin_sample, is_without_turn};
+use super::estimator::{begin_sample, evaluation, is_without_turn};
 use super::in_flight::InFlight;
 use super::state::path_state;
 use super::tiles::{Tile, TileWork, tiles};
-use crate::film::{Film, Sample, guide_add, pixel_add_real};
-use crate::packed::{ESTIMATOR_PAPER, PackedScene};
+use crate::film::{Film, Sample, group_add, guide_add, pixel_add_real};
+use crate::packed::{ESTIMATOR_PAPER, NONE, PackedScene};
 use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
 
 /// Takes the samples of `work` and adds them to the film; the rays traced. A cancelled render leaves whole pixels only: each has taken all of
@@ -99,6 +99,13 @@ fn add_sample(scene: &PackedScene, tile: &mut Tile<'_>, pass: Pass, sample: &InF
         real,
     };
     tile.sums(pixel).add(*index, &sample);
+    let evaluation = evaluation(scene, pixel, *index);
+    if !is_virtual
+        && evaluation != NONE
+        && let Some(sums) = tile.groups(pixel)
+    {
+        group_add(sums, evaluation, contribution);
+    }
     let hit = &st.first_hit;
     if hit.depth_m.is_finite()
         && let Some(sums) = tile.guide(pixel)

@@ -1,6 +1,6 @@
 //! A film cut into tiles that threads fill by themselves, and their work into blocks of pixels that are rendered together.
 
-use crate::film::{Film, GuideSums, PixelSums};
+use crate::film::{Film, GroupSums, GuideSums, PixelSums};
 use crate::work::PixelWork;
 
 /// Sides of a block, whose pixels are rendered together, pixels.
@@ -14,9 +14,10 @@ pub struct Tile<'a> {
     /// Of the first pixel.
     column: usize,
     row: usize,
-    /// By row; guides are empty where the film has none.
+    /// By row; guides and groups are empty where the film has none.
     sums: Vec<&'a mut [PixelSums]>,
     guides: Vec<&'a mut [GuideSums]>,
+    groups: Vec<&'a mut [GroupSums]>,
 }
 
 impl Tile<'_> {
@@ -30,6 +31,12 @@ impl Tile<'_> {
     pub fn guide(&mut self, pixel: u32) -> Option<&mut GuideSums> {
         let (row, column) = self.place(pixel);
         self.guides.get_mut(row)?.get_mut(column)
+    }
+
+    /// Of a pixel of the film, if it has groups.
+    pub fn groups(&mut self, pixel: u32) -> Option<&mut GroupSums> {
+        let (row, column) = self.place(pixel);
+        self.groups.get_mut(row)?.get_mut(column)
     }
 
     fn place(&self, pixel: u32) -> (usize, usize) {
@@ -68,26 +75,37 @@ pub fn tiles<'a>(film: &'a mut Film, work: &[PixelWork]) -> Vec<(Tile<'a>, TileW
     let film_width = film.width as usize;
     let mut rest = work;
     let mut guides = film.guides.chunks_mut(BLOCK_PX * film_width);
+    let mut groups = film.groups.chunks_mut(BLOCK_PX * film_width);
     let mut tiles = Vec::new();
     for (band, sums) in film.pixels.chunks_mut(BLOCK_PX * film_width).enumerate() {
         let row = band * BLOCK_PX;
         let end = row * film_width + sums.len();
         let (now, later) = rest.split_at(rest.partition_point(|w| (w.pixel as usize) < end));
         rest = later;
-        let guides = guides.next().unwrap_or_default();
+        let band = Band {
+            row,
+            sums,
+            guides: guides.next().unwrap_or_default(),
+            groups: groups.next().unwrap_or_default(),
+        };
         if !now.is_empty() {
-            tiles.extend(tiles_of_band(film_width, row, sums, guides, now));
+            tiles.extend(tiles_of_band(film_width, band, now));
         }
     }
     tiles
 }
 
-/// The tiles of [`BLOCK_PX`] rows from `row` on.
-fn tiles_of_band<'a>(
-    film_width: usize,
+/// [`BLOCK_PX`] rows of a film from `row` on.
+struct Band<'a> {
     row: usize,
     sums: &'a mut [PixelSums],
     guides: &'a mut [GuideSums],
+    groups: &'a mut [GroupSums],
+}
+
+fn tiles_of_band<'a>(
+    film_width: usize,
+    band: Band<'a>,
     work: &[PixelWork],
 ) -> impl Iterator<Item = (Tile<'a>, TileWork)> {
     let side = BLOCK_PX * BLOCKS;
@@ -97,22 +115,28 @@ fn tiles_of_band<'a>(
             let tile = Tile {
                 film_width,
                 column,
-                row,
+                row: band.row,
                 sums: Vec::new(),
                 guides: Vec::new(),
+                groups: Vec::new(),
             };
             let pixels = Vec::new();
             (tile, TileWork { film_width, pixels })
         })
         .collect();
-    for row in sums.chunks_mut(film_width) {
+    for row in band.sums.chunks_mut(film_width) {
         for ((tile, _), part) in tiles.iter_mut().zip(row.chunks_mut(side)) {
             tile.sums.push(part);
         }
     }
-    for row in guides.chunks_mut(film_width) {
+    for row in band.guides.chunks_mut(film_width) {
         for ((tile, _), part) in tiles.iter_mut().zip(row.chunks_mut(side)) {
             tile.guides.push(part);
+        }
+    }
+    for row in band.groups.chunks_mut(film_width) {
+        for ((tile, _), part) in tiles.iter_mut().zip(row.chunks_mut(side)) {
+            tile.groups.push(part);
         }
     }
     for pixel in work {
@@ -136,6 +160,7 @@ mod tests {
     fn every_pixel_lies_in_one_block_and_is_found_in_its_tile() {
         let (width, height) = (141, 21);
         let mut film = Film::new(width, height, 0, true);
+        film.set_groups(true);
         let taken = |pixel: u32| pixel % 7 != 3;
         let work: Vec<_> = (0..width * height)
             .filter(|&pixel| taken(pixel))
@@ -151,6 +176,7 @@ mod tests {
                 for work in block {
                     tile.sums(work.pixel).n += work.end;
                     tile.guide(work.pixel).expect("has guides").hits += work.end;
+                    tile.groups(work.pixel).expect("has groups").diff[0].hi[0] += work.end as f32;
                 }
             }
         }
@@ -162,15 +188,16 @@ mod tests {
             let n = if taken(pixel) { pixel + 1 } else { 0 };
             let at = pixel as usize;
             assert_eq!((film.pixels[at].n, film.guides[at].hits), (n, n));
+            assert_eq!(film.groups[at].diff[0].hi[0], n as f32);
         }
     }
 
     #[test]
-    fn a_film_without_guides_has_tiles_without() {
+    fn a_film_without_guides_and_groups_has_tiles_without() {
         let mut film = Film::new(9, 9, 0, false);
         let work = [PixelWork::new(80, 0..1)];
         let mut tiles = tiles(&mut film, &work);
         assert_eq!(tiles.len(), 1);
-        assert!(tiles[0].0.guide(80).is_none());
+        assert!(tiles[0].0.guide(80).is_none() && tiles[0].0.groups(80).is_none());
     }
 }

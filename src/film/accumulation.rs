@@ -1,5 +1,6 @@
 //! The film: sums over camera samples, a record a pixel.
 
+use crate::film::groups::GroupSums;
 use crate::film::splats::{Splat, SplatSums, is_unusable_splat};
 use crate::film::sums::{GuideSums, PixelSums, count_unusable};
 
@@ -32,6 +33,10 @@ pub enum MergeError {
     #[error("one film has photons, the other has none; render both alike")]
     Photons,
     #[error(
+        "one film has groups of samples, the other has none; render both with the same --combine"
+    )]
+    Groups,
+    #[error(
         "they were planned differently at pixel {0}: with another --no-skip, or by another kind of machine; render both alike"
     )]
     Plan(usize),
@@ -56,6 +61,8 @@ pub struct Film {
     pub guides: Vec<GuideSums>,
     /// Empty unless photons are traced.
     pub splats: Vec<SplatSums>,
+    /// Empty unless the delivered picture is combined robustly.
+    pub groups: Vec<GroupSums>,
 }
 
 impl Film {
@@ -69,7 +76,14 @@ impl Film {
             pixels: bytemuck::zeroed_vec(count),
             guides: bytemuck::zeroed_vec(if with_guides { count } else { 0 }),
             splats: Vec::new(),
+            groups: Vec::new(),
         }
+    }
+
+    /// Makes room for groups of samples, or takes it back; none are kept.
+    pub fn set_groups(&mut self, kept: bool) {
+        let count = if kept { self.pixels.len() } else { 0 };
+        self.groups = bytemuck::zeroed_vec(count);
     }
 
     /// Makes room for photons, or takes it back; none are kept.
@@ -124,6 +138,7 @@ impl Film {
         }
         self.guides.fill(GuideSums::default());
         self.splats.fill(SplatSums::default());
+        self.groups.fill(GroupSums::default());
     }
 
     /// Index of a pixel's first sample in this film.
@@ -193,6 +208,9 @@ impl Film {
         if self.splats.len() != other.splats.len() {
             return Err(MergeError::Photons);
         }
+        if self.groups.len() != other.groups.len() {
+            return Err(MergeError::Groups);
+        }
         if other.first_sample < self.first_sample {
             let mut merged = other.clone();
             merged.merge(self)?;
@@ -224,6 +242,9 @@ impl Film {
             a.merge(b);
         }
         for (a, b) in self.splats.iter_mut().zip(&other.splats) {
+            a.merge(b);
+        }
+        for (a, b) in self.groups.iter_mut().zip(&other.groups) {
             a.merge(b);
         }
         Ok(())

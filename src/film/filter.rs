@@ -220,7 +220,7 @@ impl Canvas {
 }
 
 /// 1 where both lie in one plane and face the same way, towards 0 elsewhere.
-fn same_surface(a: &RealSurface, b: &RealSurface) -> f32 {
+pub(super) fn same_surface(a: &RealSurface, b: &RealSurface) -> f32 {
     let off_plane = a.normal.dot(b.position - a.position).abs();
     let normal = a.normal.dot(b.normal).max(0.0).powi(NORMAL_POWER);
     normal * (-off_plane / (PLANE_TOLERANCE * a.depth_m.max(f32::MIN_POSITIVE))).exp()

@@ -1,10 +1,13 @@
 //! The film and what is made of it: sums over samples, the composite over the photograph, the output planes.
 
 mod accumulation;
+mod combine;
 mod compare;
 mod composite;
 mod filter;
+mod final_filter;
 mod flip;
+pub(crate) mod groups;
 mod pools;
 mod scrambles;
 pub(crate) mod splats;
@@ -13,6 +16,7 @@ pub(crate) mod sums;
 mod test_support;
 
 pub use accumulation::{Film, MergeError, PixelCounts, PixelKind};
+pub use combine::{Combined, combine_robustly, group_counts};
 pub use compare::{Comparison, SizeMismatch, compare};
 pub(crate) use composite::Means;
 pub use composite::{
@@ -20,7 +24,9 @@ pub use composite::{
     variance,
 };
 pub use filter::{RealSurface, filter_difference};
+pub use final_filter::filter_finally;
 pub use flip::{flip, flip_map};
+pub use groups::{GROUPS, GroupSums, group_add};
 pub use pools::pooled;
 pub use scrambles::Scrambles;
 pub use splats::{Splat, SplatSums};

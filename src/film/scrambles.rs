@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::composite::{Means, QUOTIENT_EPSILON};
-use super::{Film, GuideSums, PixelSums, SplatSums};
+use super::{Film, GroupSums, GuideSums, PixelSums, SplatSums, group_add};
 use crate::scene::{Composite, Photo};
 
 /// What the composite of one channel is made of, scramble by scramble.
@@ -69,10 +69,12 @@ pub struct Scrambles {
 }
 
 impl Scrambles {
-    /// For films like this one, whose pixels `active` (row-major indices, ascending) alone are sampled.
-    pub fn new(like: &Film, mode: Composite, active: Vec<u32>) -> Self {
+    /// For films like this one, whose pixels `active` (row-major indices, ascending) alone are sampled. `grouped`: every fifth scramble of a
+    /// pixel is one of its groups.
+    pub fn new(like: &Film, mode: Composite, grouped: bool, active: Vec<u32>) -> Self {
         let mut film = Film::new(like.width, like.height, 0, !like.guides.is_empty());
         film.set_photons(!like.splats.is_empty());
+        film.set_groups(grouped);
         film.set_sample_factors(like.pixels.iter().map(|sums| sums.sample_factor));
         let moments = vec![Moments::default(); active.len()];
         Self {
@@ -86,6 +88,15 @@ impl Scrambles {
     /// Adds a scramble: every pixel that it has samples of.
     pub fn add(&mut self, scramble: &Film) {
         let mode = self.mode;
+        if !self.film.groups.is_empty() {
+            for (&pixel, moments) in self.active.iter().zip(&self.moments) {
+                let sums = &scramble.pixels[pixel as usize];
+                if sums.n > 0 {
+                    let sum = sums.diff.value().as_vec3();
+                    group_add(&mut self.film.groups[pixel as usize], moments.count, sum);
+                }
+            }
+        }
         self.active
             .par_iter()
             .zip(&mut self.moments)
@@ -129,6 +140,9 @@ impl Scrambles {
         }
         if let Some(splats) = self.film.splats.get_mut(pixel) {
             *splats = SplatSums::default();
+        }
+        if let Some(groups) = self.film.groups.get_mut(pixel) {
+            *groups = GroupSums::default();
         }
         if let Ok(slot) = self.active.binary_search(&(pixel as u32)) {
             self.moments[slot] = Moments::default();

@@ -81,6 +81,15 @@ impl SplatSums {
         self.photons += other.photons;
     }
 
+    /// Standard deviation of what the photons bring to the pixel's difference, an upper estimate. `pixels`: of the picture.
+    pub(super) fn deviation(&self, pixels: f64) -> DVec3 {
+        if self.photons == 0 {
+            return DVec3::ZERO;
+        }
+        let sum = value_of(self.sq, SQUARE_STEPS);
+        DVec3::from(sum.to_array().map(f64::sqrt)) * (pixels / self.photons as f64)
+    }
+
     /// The pixel's sums with what the photons bring, as if its samples had found it: each real one its share of what they brought to real
     /// surfaces, each virtual one its share of the rest. The variance of the mean grows by the photons' own, an upper estimate as theirs are
     /// stratified. `pixels`: of the picture.

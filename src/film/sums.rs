@@ -102,10 +102,21 @@ impl Sum3 {
         DVec3::from_array([0, 1, 2].map(|c| f64::from(self.hi[c]) + f64::from(self.lo[c])))
     }
 
-    fn merge(&mut self, other: &Self) {
+    pub(super) fn merge(&mut self, other: &Self) {
         for c in 0..3 {
             (self.hi[c], self.lo[c]) =
                 sum_merge((self.hi[c], self.lo[c]), (other.hi[c], other.lo[c]));
+        }
+    }
+}
+
+impl From<DVec3> for Sum3 {
+    fn from(sum: DVec3) -> Self {
+        let hi = sum.as_vec3();
+        let lo = (sum - hi.as_dvec3()).as_vec3();
+        Self {
+            hi: hi.to_array(),
+            lo: lo.to_array(),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Film, Sample, pixel_add_real};
+use super::{Film, Sample, group_add, pixel_add_real};
 
 impl Film {
     /// Adds the pixel's next sample.
@@ -15,6 +15,17 @@ impl Film {
     pub(crate) fn add_real(&mut self, pixel: usize, is_virtual: bool, real: Vec3) {
         let index = self.first_index(pixel) + self.pixels[pixel].n_real;
         pixel_add_real(&mut self.pixels[pixel], index, is_virtual, real);
+    }
+
+    /// Adds a difference, to the sums and its group.
+    pub(crate) fn add_difference(&mut self, pixel: usize, index: u32, difference: Vec3) {
+        let sample = Sample {
+            is_virtual: false,
+            contribution: difference,
+            real: None,
+        };
+        self.pixels[pixel].add(index, &sample);
+        group_add(&mut self.groups[pixel], index, difference);
     }
 }
 

@@ -182,6 +182,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &material::scatter::SHARED,
     &material::surface::SHARED,
     &material::texture::SHARED,
+    &film::groups::SHARED,
     &film::sums::SHARED,
     &super::lanes::SHARED,
     &super::photons::SHARED,

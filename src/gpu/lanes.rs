@@ -8,7 +8,7 @@ use bytemuck::{AnyBitPattern, Pod, Zeroable};
 
 use super::kernel::Kernel;
 use super::{GpuDevice, GpuError};
-use crate::film::{GuideSums, PixelSums};
+use crate::film::{Film, GroupSums, GuideSums, PixelSums};
 use crate::shared::{WORKGROUP, shared};
 use crate::work::{PixelWork, SampleRays};
 
@@ -27,7 +27,7 @@ shared! {
         pub with_guides: u32,
         /// Stays 0; the shader hides intermediate sums from the compiler with it.
         pub zero: u32,
-        pub pad: u32,
+        pub with_groups: u32,
     }
 
     /// Places in the shader's `counters`, which are words: of [`Counters::lanes_in`] and so on.
@@ -56,6 +56,7 @@ pub struct Counters {
 pub const COUNTERS_BYTES: u64 = size_of::<Counters>() as u64;
 const SUMS_BYTES: u64 = size_of::<PixelSums>() as u64;
 const GUIDE_BYTES: u64 = size_of::<GuideSums>() as u64;
+const GROUP_BYTES: u64 = size_of::<GroupSums>() as u64;
 const WORK_BYTES: u64 = size_of::<PixelWork>() as u64;
 
 /// Bind group of the parts of a sample's state.
@@ -71,10 +72,62 @@ pub fn state_parts(kernels: &[Kernel]) -> BTreeMap<String, u64> {
         .collect()
 }
 
+/// What a film may have of a pixel beside its sums.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Beside {
+    pub guides: bool,
+    pub groups: bool,
+}
+
+impl Beside {
+    pub fn of(film: &Film) -> Self {
+        Self {
+            guides: !film.guides.is_empty(),
+            groups: !film.groups.is_empty(),
+        }
+    }
+}
+
+/// Sums of some pixels of a film, one after the other.
+#[derive(Clone, Debug, Default)]
+pub struct Gathered {
+    pub sums: Vec<PixelSums>,
+    /// Empty where the film has none.
+    pub guides: Vec<GuideSums>,
+    pub groups: Vec<GroupSums>,
+}
+
+impl Gathered {
+    pub fn of(film: &Film, work: &[PixelWork]) -> Self {
+        fn some<T: Copy>(all: &[T], work: &[PixelWork]) -> Vec<T> {
+            let each = work.iter();
+            each.filter_map(|work| all.get(work.pixel as usize).copied())
+                .collect()
+        }
+        Self {
+            sums: some(&film.pixels, work),
+            guides: some(&film.guides, work),
+            groups: some(&film.groups, work),
+        }
+    }
+
+    /// Puts them back.
+    pub fn scatter(self, film: &mut Film, work: &[PixelWork]) {
+        fn put<T>(all: &mut [T], work: &[PixelWork], some: Vec<T>) {
+            for (work, sums) in work.iter().zip(some) {
+                all[work.pixel as usize] = sums;
+            }
+        }
+        put(&mut film.pixels, work, self.sums);
+        put(&mut film.guides, work, self.guides);
+        put(&mut film.groups, work, self.groups);
+    }
+}
+
 /// Buffers for up to `capacity` lanes.
 pub struct Lanes {
     pub capacity: usize,
-    pub with_guides: bool,
+    pub beside: Beside,
     pub batch: wgpu::Buffer,
     pub work: wgpu::Buffer,
     /// By name.
@@ -84,13 +137,14 @@ pub struct Lanes {
     pub indirect: wgpu::Buffer,
     pub pixel_sums: wgpu::Buffer,
     pub guide_sums: wgpu::Buffer,
-    /// Counters, then sums, then guides.
+    pub group_sums: wgpu::Buffer,
+    /// Counters, then sums, then guides, then groups.
     pub staging: wgpu::Buffer,
 }
 
 /// As many lanes as take no more memory than the largest array that the device can bind, with `state_bytes` for the state of one.
 pub fn most_lanes(gpu: &GpuDevice, state_bytes: u64) -> usize {
-    let largest = state_bytes.max(SUMS_BYTES + GUIDE_BYTES + COUNTERS_BYTES);
+    let largest = state_bytes.max(SUMS_BYTES + GUIDE_BYTES + GROUP_BYTES + COUNTERS_BYTES);
     let bindable = gpu
         .limits
         .max_storage_buffer_binding_size
@@ -108,11 +162,12 @@ impl Lanes {
         gpu: &GpuDevice,
         capacity: usize,
         parts: &BTreeMap<String, u64>,
-        with_guides: bool,
+        beside: Beside,
     ) -> Result<Self, GpuError> {
         use wgpu::BufferUsages as Usage;
         let count = capacity as u64;
-        let guides = if with_guides { count } else { 1 };
+        let guides = if beside.guides { count } else { 1 };
+        let groups = if beside.groups { count } else { 1 };
         let make = |label, size, usage| {
             gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -126,7 +181,7 @@ impl Lanes {
         let queue = || make("queue", 4 * count, Usage::STORAGE);
         gpu.catching(|| Self {
             capacity,
-            with_guides,
+            beside,
             batch: make(
                 "batch",
                 size_of::<Batch>() as u64,
@@ -142,9 +197,10 @@ impl Lanes {
             indirect: make("indirect", 12, Usage::STORAGE | Usage::INDIRECT),
             pixel_sums: make("pixel sums", SUMS_BYTES * count, both),
             guide_sums: make("guide sums", GUIDE_BYTES * guides, both),
+            group_sums: make("group sums", GROUP_BYTES * groups, both),
             staging: make(
                 "staging",
-                COUNTERS_BYTES + SUMS_BYTES * count + GUIDE_BYTES * guides,
+                COUNTERS_BYTES + SUMS_BYTES * count + GUIDE_BYTES * guides + GROUP_BYTES * groups,
                 Usage::MAP_READ | Usage::COPY_DST,
             ),
         })
@@ -168,21 +224,17 @@ impl Lanes {
             "indirect" => &self.indirect,
             "pixel_sums" => &self.pixel_sums,
             "guide_sums" => &self.guide_sums,
+            "group_sums" => &self.group_sums,
             part => return self.parts.get(part),
         })
     }
 
-    pub fn upload(
-        &self,
-        gpu: &GpuDevice,
-        work: &[PixelWork],
-        sums: &[PixelSums],
-        guides: &[GuideSums],
-    ) {
+    pub fn upload(&self, gpu: &GpuDevice, work: &[PixelWork], gathered: &Gathered) {
         let write = |buffer, bytes| gpu.queue.write_buffer(buffer, 0, bytes);
         write(&self.work, bytemuck::cast_slice(work));
-        write(&self.pixel_sums, bytemuck::cast_slice(sums));
-        write(&self.guide_sums, bytemuck::cast_slice(guides));
+        write(&self.pixel_sums, bytemuck::cast_slice(&gathered.sums));
+        write(&self.guide_sums, bytemuck::cast_slice(&gathered.guides));
+        write(&self.group_sums, bytemuck::cast_slice(&gathered.groups));
     }
 
     pub fn clear_counters(&self, gpu: &GpuDevice) {
@@ -194,13 +246,22 @@ impl Lanes {
     }
 
     pub fn copy_sums(&self, encoder: &mut wgpu::CommandEncoder, pixels: usize) {
-        let sums = SUMS_BYTES * pixels as u64;
-        encoder.copy_buffer_to_buffer(&self.pixel_sums, 0, &self.staging, COUNTERS_BYTES, sums);
-        if self.with_guides {
-            let guides = GUIDE_BYTES * pixels as u64;
-            let to = COUNTERS_BYTES + sums;
-            encoder.copy_buffer_to_buffer(&self.guide_sums, 0, &self.staging, to, guides);
+        let parts = [&self.pixel_sums, &self.guide_sums, &self.group_sums];
+        let mut to = COUNTERS_BYTES;
+        for (buffer, bytes) in parts.into_iter().zip(self.sums_bytes(pixels)) {
+            if bytes > 0 {
+                encoder.copy_buffer_to_buffer(buffer, 0, &self.staging, to, bytes);
+            }
+            to += bytes;
         }
+    }
+
+    /// Of sums, guides and groups.
+    fn sums_bytes(&self, pixels: usize) -> [u64; 3] {
+        let Beside { guides, groups } = self.beside;
+        let counts = [1, u64::from(guides), u64::from(groups)];
+        let bytes = [SUMS_BYTES, GUIDE_BYTES, GROUP_BYTES];
+        std::array::from_fn(|part| counts[part] * bytes[part] * pixels as u64)
     }
 
     /// # Errors
@@ -210,7 +271,7 @@ impl Lanes {
         Ok(bytemuck::pod_read_unaligned(&bytes))
     }
 
-    /// What [`Lanes::copy_counters`] and [`Lanes::copy_sums`] copied; no guides unless there are any.
+    /// What [`Lanes::copy_counters`] and [`Lanes::copy_sums`] copied; no guides or groups unless there are any.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
@@ -218,20 +279,17 @@ impl Lanes {
         &self,
         gpu: &GpuDevice,
         pixels: usize,
-    ) -> Result<(Counters, Vec<PixelSums>, Vec<GuideSums>), GpuError> {
-        let sums = SUMS_BYTES * pixels as u64;
-        let guides = if self.with_guides {
-            GUIDE_BYTES * pixels as u64
-        } else {
-            0
-        };
-        let bytes = gpu.read(&self.staging, COUNTERS_BYTES + sums + guides)?;
+    ) -> Result<(Counters, Gathered), GpuError> {
+        let [sums, guides, groups] = self.sums_bytes(pixels);
+        let bytes = gpu.read(&self.staging, COUNTERS_BYTES + sums + guides + groups)?;
         let (counters, rest) = bytes.split_at(COUNTERS_BYTES as usize);
-        let (sums, guides) = rest.split_at(sums as usize);
-        Ok((
-            bytemuck::pod_read_unaligned(counters),
-            bytemuck::pod_collect_to_vec(sums),
-            bytemuck::pod_collect_to_vec(guides),
-        ))
+        let (sums, rest) = rest.split_at(sums as usize);
+        let (guides, groups) = rest.split_at(guides as usize);
+        let gathered = Gathered {
+            sums: bytemuck::pod_collect_to_vec(sums),
+            guides: bytemuck::pod_collect_to_vec(guides),
+            groups: bytemuck::pod_collect_to_vec(groups),
+        };
+        Ok((bytemuck::pod_read_unaligned(counters), gathered))
     }
 }

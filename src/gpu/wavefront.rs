@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::kernel::{BindGroups, Kernel};
-use super::lanes::{Batch, Counters, Lanes, most_lanes, state_parts};
+use super::lanes::{Batch, Beside, Counters, Gathered, Lanes, most_lanes, state_parts};
 use super::pacer::Pacer;
 use super::photons::Photons;
 use super::profile::{
@@ -240,7 +240,7 @@ impl GpuBackend {
         let mut rest = pixels.as_slice();
         while !rest.is_empty() && !watcher.is_cancelled() {
             let lanes = self.pacer.lanes();
-            let lanes = self.prepare(lanes, !film.guides.is_empty())?;
+            let lanes = self.prepare(lanes, Beside::of(film))?;
             let (now, later) = rest.split_at(pixels_that_fit(rest, lanes));
             let at_once = (lanes / now.len()).clamp(1, MOST_SAMPLES as usize) as u32;
             self.render_pixels(film, work.pass, now, at_once, rays)?;
@@ -274,15 +274,15 @@ impl GpuBackend {
     }
 
     /// Makes room for `wanted` lanes, or for as many as there is memory for; returns how many may be used.
-    fn prepare(&mut self, wanted: usize, with_guides: bool) -> Result<usize, GpuError> {
+    fn prepare(&mut self, wanted: usize, beside: Beside) -> Result<usize, GpuError> {
         let present = match &self.lanes {
-            Some(lanes) if lanes.with_guides == with_guides => lanes.capacity,
+            Some(lanes) if lanes.beside == beside => lanes.capacity,
             _ => 0,
         };
         if present >= wanted {
             return Ok(wanted);
         }
-        match Lanes::new(&self.gpu, wanted, &self.state_parts, with_guides) {
+        match Lanes::new(&self.gpu, wanted, &self.state_parts, beside) {
             Ok(lanes) => {
                 self.bind(&lanes)?;
                 self.lanes = Some(lanes);
@@ -333,14 +333,7 @@ impl GpuBackend {
         work: &[PixelWork],
         at_once: u32,
     ) -> Result<RayCounts, GpuError> {
-        let gather = |pixel: &PixelWork| film.pixels[pixel.pixel as usize];
-        let sums: Vec<_> = work.iter().map(gather).collect();
-        let guides: Vec<_> = if lanes.with_guides {
-            work.iter().map(|w| film.guides[w.pixel as usize]).collect()
-        } else {
-            Vec::new()
-        };
-        lanes.upload(&self.gpu, work, &sums, &guides);
+        lanes.upload(&self.gpu, work, &Gathered::of(film, work));
 
         let longest = work.iter().map(PixelWork::samples).max().unwrap_or(0);
         let real_pass = pass == Pass::Real;
@@ -354,7 +347,8 @@ impl GpuBackend {
                 sample_offset,
                 sample_count,
                 real_pass: u32::from(real_pass),
-                with_guides: u32::from(lanes.with_guides && !real_pass),
+                with_guides: u32::from(lanes.beside.guides && !real_pass),
+                with_groups: u32::from(lanes.beside.groups && !real_pass),
                 ..Batch::default()
             };
             self.run_batch(lanes, &batch)?;
@@ -448,14 +442,9 @@ impl GpuBackend {
         }
         lanes.copy_sums(&mut encoder, work.len());
         self.submit(encoder)?;
-        let (counters, sums, guides) = lanes.read_sums(&self.gpu, work.len())?;
+        let (counters, gathered) = lanes.read_sums(&self.gpu, work.len())?;
         self.take_times()?;
-        for (work, sums) in work.iter().zip(sums) {
-            film.pixels[work.pixel as usize] = sums;
-        }
-        for (work, guides) in work.iter().zip(guides) {
-            film.guides[work.pixel as usize] = guides;
-        }
+        gathered.scatter(film, work);
         Ok(counters)
     }
 

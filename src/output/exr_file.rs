@@ -28,7 +28,7 @@ pub struct Metadata {
     pub camera: Camera,
     /// Independent scrambles that the variance plane is taken from; `None`: it is that of the samples.
     pub scrambles: Option<u32>,
-    /// The preview filter has smoothed the picture.
+    /// A filter has smoothed the picture.
     pub filtered: bool,
 }
 
@@ -38,7 +38,7 @@ impl Metadata {
         let scene = renderer.scene();
         Self {
             rays_per_pixel: renderer.samples(),
-            filtered: renderer.is_filtered(),
+            filtered: renderer.filter().is_some(),
             scrambles: renderer.stated().map(|stated| stated.scrambles),
             max_bounces: scene.settings.max_bounces,
             seed: scene.settings.seed,

@@ -8,8 +8,9 @@ use super::ChannelFile;
 use super::exr_file::{Channels, push_channel, write_layers};
 use super::film_note::{FORM, FilmNote, NOTE, NOTE_OF_FORM_1};
 use super::{Metadata, OutputError, Target};
-use crate::film::{Film, GuideSums, Picture, PixelSums, Planes, SplatSums, Sum3};
+use crate::film::{Film, GroupSums, GuideSums, Picture, PixelSums, Planes, SplatSums, Sum3};
 use crate::refusal::Refusal;
+use crate::scene::Combine;
 
 /// As [`super::write_exr`], with the film's sums and what they are a part of.
 ///
@@ -43,6 +44,12 @@ pub fn write_film(
     if !film.splats.is_empty() {
         for (name, get, _) in splat_fields() {
             let samples = film.splats.iter().map(get).collect::<Vec<u32>>();
+            push_channel(&mut channels, &name, samples);
+        }
+    }
+    if !film.groups.is_empty() {
+        for (name, get, _) in group_fields() {
+            let samples = film.groups.iter().map(get).collect::<Vec<f32>>();
             push_channel(&mut channels, &name, samples);
         }
     }
@@ -93,6 +100,7 @@ fn film_of(file: &ChannelFile, note: &FilmNote) -> Result<Film, String> {
         pixels: vec![PixelSums::zeroed(); count],
         guides: Vec::new(),
         splats: Vec::new(),
+        groups: Vec::new(),
     };
     for (name, _, set) in float_fields() {
         fill(&mut film.pixels, finite(file, &name)?, set);
@@ -113,6 +121,12 @@ fn film_of(file: &ChannelFile, note: &FilmNote) -> Result<Film, String> {
         for (name, _, set) in splat_fields() {
             let samples = file.counts.get(&name).ok_or_else(|| missing(&name))?;
             fill(&mut film.splats, samples, set);
+        }
+    }
+    if note.combine == Combine::Robust {
+        film.set_groups(true);
+        for (name, _, set) in group_fields() {
+            fill(&mut film.groups, finite(file, &name)?, set);
         }
     }
     Ok(film)
@@ -145,6 +159,7 @@ fn missing(name: &str) -> String {
     )
 }
 
+const RGB: [&str; 3] = ["R", "G", "B"];
 const GUIDE_HITS: &str = "sums.hits.Y";
 
 /// A channel's name, and how its samples are read from and written to a record.
@@ -184,6 +199,19 @@ fn splat_words(sums: &SplatSums) -> [u64; size_of::<SplatSums>() / size_of::<u64
     bytemuck::cast(*sums)
 }
 
+/// A sum by its name.
+type NamedSum<R> = (&'static str, fn(&R) -> &Sum3, fn(&mut R) -> &mut Sum3);
+
+fn group_fields() -> impl Iterator<Item = Field<GroupSums, f32, String>> {
+    const SUMS: [NamedSum<GroupSums>; 4] = [
+        ("diff_0", |g| &g.diff[0], |g| &mut g.diff[0]),
+        ("diff_1", |g| &g.diff[1], |g| &mut g.diff[1]),
+        ("diff_2", |g| &g.diff[2], |g| &mut g.diff[2]),
+        ("diff_3", |g| &g.diff[3], |g| &mut g.diff[3]),
+    ];
+    (SUMS.into_iter()).flat_map(|(name, get, get_mut)| sum3_fields(name, RGB, get, get_mut))
+}
+
 /// Six channels of three double-floats.
 fn sum3_fields<R: 'static>(
     name: &'static str,
@@ -208,7 +236,6 @@ fn sum3_fields<R: 'static>(
 }
 
 fn float_fields() -> Vec<Field<PixelSums, f32, String>> {
-    const RGB: [&str; 3] = ["R", "G", "B"];
     [
         sum3_fields("m_im", RGB, |p: &PixelSums| &p.m_im, |p| &mut p.m_im),
         sum3_fields("diff", RGB, |p: &PixelSums| &p.diff, |p| &mut p.diff),

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::renderer::Without;
-use crate::scene::{Choice, Composite, Estimator, Overrides, SamplerKind, Scene, Settings};
+use crate::scene::{
+    Choice, Combine, Composite, Estimator, Overrides, SamplerKind, Scene, Settings,
+};
 
 /// What a film is a part of: only parts of one render can be put together.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,6 +30,8 @@ pub struct FilmNote {
     pub sampler: SamplerKind,
     #[serde(with = "by_name")]
     pub composite: Composite,
+    #[serde(with = "by_name")]
+    pub combine: Combine,
     /// Savings that were left out, as far as films show it ([`Without::of_films`]): real rays that edge pixels lack are traced as the others were.
     #[serde(with = "savings")]
     pub without: Without,
@@ -38,7 +42,7 @@ pub(super) const NOTE: &str = "mixray.film";
 /// The attribute that films of the first form had.
 pub(super) const NOTE_OF_FORM_1: &str = "mixray.film.version";
 /// The form of note and channels that this program writes and reads.
-pub(super) const FORM: u32 = 3;
+pub(super) const FORM: u32 = 4;
 
 #[derive(Serialize)]
 struct WrittenNote<'a> {
@@ -102,6 +106,7 @@ impl FilmNote {
             estimator: settings.estimator,
             sampler: settings.sampler,
             composite: settings.composite,
+            combine: settings.combine,
             without,
         }
     }
@@ -115,6 +120,7 @@ impl FilmNote {
             estimator: Some(self.estimator),
             sampler: Some(self.sampler),
             composite: Some(self.composite),
+            combine: Some(self.combine),
             backend: None,
         }
     }
@@ -132,6 +138,7 @@ impl FilmNote {
             .or_else(|| differ("estimator", self.estimator.name(), other.estimator.name()))
             .or_else(|| differ("sampler", self.sampler.name(), other.sampler.name()))
             .or_else(|| differ("composite", self.composite.name(), other.composite.name()))
+            .or_else(|| differ("combination", self.combine.name(), other.combine.name()))
             .or_else(|| {
                 let [a, b] = [self.without, other.without].map(Without::names);
                 differ("savings left out (--no-skip)", &a, &b)

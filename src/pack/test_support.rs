@@ -3,8 +3,8 @@
 use glam::DMat4;
 
 use crate::scene::{
-    Aperture, Backdrop, BackendChoice, Camera, Composite, Estimator, Exposure, Instance, Lens,
-    Material, Object, Primitive, SamplerKind, Scene, Settings, Side, Stages,
+    Aperture, Backdrop, BackendChoice, Camera, Combine, Composite, Estimator, Exposure, Instance,
+    Lens, Material, Object, Primitive, SamplerKind, Scene, Settings, Side, Stages,
 };
 
 /// A camera of 4 x 3 pixels at the origin that looks along -Z, and nothing else.
@@ -42,6 +42,7 @@ pub fn test_scene() -> Scene {
             estimator: Estimator::Direct,
             sampler: SamplerKind::Sobol,
             composite: Composite::Additive,
+            combine: Combine::Robust,
             backend: BackendChoice::Cpu,
             multiple_scattering: false,
             exposure: Exposure::Ev(0.0),

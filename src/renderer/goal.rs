@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use crate::scene::{NoiseFit, srgb};
+use super::RenderError;
+use crate::scene::{NoiseFit, Scene, srgb};
 
 /// Noise of a camera: variance of each channel's 8-bit code value (0..255, sRGB-encoded) as a straight line over it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +31,32 @@ pub struct ErrorGoal {
     pub noise: Option<CameraNoise>,
     /// No pixel takes more samples than this.
     pub max_rays_per_pixel: u32,
+}
+
+/// A goal that may wait for its scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Goal {
+    pub goal: ErrorGoal,
+    /// The camera's noise is that of the scene's `[noise]`.
+    pub noise_of_scene: bool,
+}
+
+impl Goal {
+    /// The goal for that scene.
+    ///
+    /// # Errors
+    /// [`RenderError::NoCameraNoise`].
+    pub fn of(self, scene: &Scene) -> Result<ErrorGoal, RenderError> {
+        if !self.noise_of_scene {
+            return Ok(self.goal);
+        }
+        let noise = scene.stages.noise.as_ref();
+        let fit = noise.ok_or(RenderError::NoCameraNoise)?.profile.fit;
+        Ok(ErrorGoal {
+            noise: Some(CameraNoise { fit }),
+            ..self.goal
+        })
+    }
 }
 
 impl ErrorGoal {

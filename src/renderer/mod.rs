@@ -46,8 +46,9 @@ use std::sync::Arc;
 pub use adaptive::{SCRAMBLES, Stated};
 pub use budget::Budget;
 pub use frames::FrameEdit;
-pub use goal::{CameraNoise, ErrorGoal};
+pub use goal::{CameraNoise, ErrorGoal, Goal};
 pub use picture_motion::PreviousView;
+pub use shown::Delivered;
 pub use skips::{Skip, Without};
 pub use stats::Stats;
 
@@ -61,7 +62,7 @@ use stopwatch::Stopwatch;
 use crate::film::{Film, RealSurface};
 use crate::gpu::{GpuDevice, KernelSeconds};
 use crate::packed::PackedScene;
-use crate::scene::{Scene, Settings};
+use crate::scene::{Choice, Combine, Scene, Settings};
 
 /// What the caller wants beside the scene's own settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -73,8 +74,29 @@ pub struct RendererOptions {
     pub sample_range: Option<(u32, u32)>,
     /// Savings to do without.
     pub without: Without,
-    /// Pictures and planes show the difference on diffuse real surfaces smoothed: for previews, biased. The film is not touched.
-    pub filter: bool,
+    /// Pictures show the difference filtered; the film is not touched.
+    pub filter: Option<Filter>,
+}
+
+impl RendererOptions {
+    /// The film of such a scene has groups of samples.
+    fn keeps_groups(&self, combine: Combine) -> bool {
+        self.filter == Some(Filter::Final) || (combine == Combine::Robust && self.filter.is_none())
+    }
+}
+
+/// A filter of the difference. Biased.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Filter {
+    /// Of pictures and planes, for previews of a few rays per pixel: smooth on diffuse real surfaces.
+    Preview,
+    /// Of what is delivered: as smooth as its own error calls for, for stills and videos.
+    Final,
+}
+
+impl Choice for Filter {
+    const CHOICES: &'static [(&'static str, Self)] =
+        &[("preview", Self::Preview), ("final", Self::Final)];
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -100,6 +122,10 @@ pub enum RenderError {
         "objects that move while the shutter is open are not rendered to a stated error; leave out the goal, or [shutter]"
     )]
     MovingGoal,
+    #[error(
+        "the scene has no [noise], where --stop-at camera-noise finds the camera's; give --camera-noise NOISE.toml or A,B"
+    )]
+    NoCameraNoise,
     #[error("there is no object number {0} in the scene")]
     NoSuchObject(usize),
 }
@@ -175,9 +201,10 @@ impl Renderer {
         if first_sample >= end_sample || end_sample > total {
             return Err(RenderError::SampleRange(first_sample, end_sample, total));
         }
-        needs::ensure_scene(&scene, options.all_planes)?;
+        let grouped = options.keeps_groups(scene.settings.combine);
+        needs::ensure_scene(&scene, options.all_planes, grouped)?;
         let packed = PackedScene::build(&scene, watcher)?;
-        needs::ensure_film(&packed, options.all_planes)?;
+        needs::ensure_film(&packed, options.all_planes, grouped)?;
         let film = Film::new(
             packed.frame.width,
             packed.frame.height,
@@ -262,8 +289,7 @@ impl Renderer {
         self.core.options.without
     }
 
-    /// Whether the preview filter is on.
-    pub fn is_filtered(&self) -> bool {
+    pub fn filter(&self) -> Option<Filter> {
         self.core.options.filter
     }
 

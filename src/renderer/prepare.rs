@@ -129,8 +129,10 @@ impl Renderer {
         );
         let factors = core.packed.pixels.iter().map(|p| p.sample_factor);
         core.film.set_sample_factors(factors);
+        let grouped = core.options.keeps_groups(core.scene.settings.combine);
+        core.film.set_groups(grouped);
         core.film.set_photons(core.packed.photons_per_ray > 0);
-        if core.options.filter {
+        if core.options.filter.is_some() {
             self.surfaces = cpu::diffuse_surfaces(&core.packed);
         }
         core.seconds.look_ahead += stopwatch.secs();

@@ -2,23 +2,72 @@
 
 use std::borrow::Cow;
 
-use super::Renderer;
-use crate::film::{Film, Picture, Planes, composite, estimated_error, filter_difference, planes};
+use super::core::Core;
+use super::{Filter, Renderer};
+use crate::cpu::estimator::evaluations_before;
+use crate::film::{
+    Combined, Film, GROUPS, Picture, Planes, combine_robustly, composite, estimated_error,
+    filter_difference, filter_finally, group_counts, planes,
+};
+
+/// What is delivered of a film.
+#[derive(Clone, Debug)]
+pub struct Delivered {
+    pub picture: Picture,
+    /// Of the difference in real pixels, the share that the robust combination gave to other pixels nearby; `None` for means.
+    pub moved: Option<f64>,
+}
 
 impl Renderer {
     /// The film as pictures show it.
     fn shown(&self) -> Cow<'_, Film> {
-        if self.core.options.filter {
+        if self.core.options.filter == Some(Filter::Preview) {
             Cow::Owned(filter_difference(&self.core.film, &self.surfaces))
         } else {
             Cow::Borrowed(&self.core.film)
         }
     }
 
-    /// The film composited over the photograph.
+    /// The film composited over the photograph: means of the samples.
     pub fn picture(&self) -> Picture {
+        self.composited(&self.shown())
+    }
+
+    /// The picture as it is delivered: with the scene's combination of samples, or filtered.
+    pub fn delivered(&self) -> Delivered {
+        let film = &self.core.film;
+        let photo = self.core.scene.photo.as_ref();
+        let counts = |pixel| self.group_counts(pixel);
+        let (picture, moved) = match self.core.options.filter {
+            Some(Filter::Final) => {
+                let film = filter_finally(film, photo, &self.surfaces, counts);
+                (self.composited(&film), None)
+            }
+            None if !film.groups.is_empty() => {
+                let Combined { film, moved } = combine_robustly(film, photo, counts);
+                (self.composited(&film), Some(moved))
+            }
+            Some(Filter::Preview) | None => (self.picture(), None),
+        };
+        Delivered { picture, moved }
+    }
+
+    /// Evaluations of a pixel's difference, by group.
+    fn group_counts(&self, pixel: usize) -> [u32; GROUPS as usize] {
+        let Core { film, packed, .. } = &self.core;
+        let sums = &film.pixels[pixel];
+        if self.stated.is_some() {
+            return group_counts(0, sums.n / sums.sample_factor.max(1));
+        }
+        let first = film.first_index(pixel);
+        let [first, end] =
+            [first, first + sums.n].map(|index| evaluations_before(packed, pixel as u32, index));
+        group_counts(first, end)
+    }
+
+    fn composited(&self, film: &Film) -> Picture {
         composite(
-            &self.shown(),
+            film,
             self.core.scene.photo.as_ref(),
             self.core.scene.settings.composite,
         )

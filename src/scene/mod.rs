@@ -294,6 +294,15 @@ pub enum Composite {
     Quotient,
 }
 
+/// How the samples of the difference become the picture that is delivered. Films, layers and stated errors are means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Combine {
+    /// Their mean.
+    Mean,
+    /// In real pixels rare bright samples are weighted down and spread over their neighbourhood.
+    Robust,
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BackendChoice {
     Auto,
@@ -330,6 +339,7 @@ pub struct Settings {
     pub estimator: Estimator,
     pub sampler: SamplerKind,
     pub composite: Composite,
+    pub combine: Combine,
     pub backend: BackendChoice,
     /// Facets of rough metal and glass send light to each other, so that none is lost; false: as glTF defines its lobes.
     pub multiple_scattering: bool,

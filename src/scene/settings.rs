@@ -2,7 +2,9 @@
 
 use super::error::Result;
 use super::reader::{Choice, Node, Table};
-use super::{Backdrop, BackendChoice, Composite, Estimator, Exposure, SamplerKind, Settings, Side};
+use super::{
+    Backdrop, BackendChoice, Combine, Composite, Estimator, Exposure, SamplerKind, Settings, Side,
+};
 
 impl Choice for Side {
     const CHOICES: &'static [(&'static str, Self)] =
@@ -27,6 +29,11 @@ impl Choice for Composite {
         &[("additive", Self::Additive), ("quotient", Self::Quotient)];
 }
 
+impl Choice for Combine {
+    const CHOICES: &'static [(&'static str, Self)] =
+        &[("mean", Self::Mean), ("robust", Self::Robust)];
+}
+
 impl Choice for BackendChoice {
     const CHOICES: &'static [(&'static str, Self)] =
         &[("auto", Self::Auto), ("gpu", Self::Gpu), ("cpu", Self::Cpu)];
@@ -42,6 +49,7 @@ impl Default for Settings {
             estimator: Estimator::Direct,
             sampler: SamplerKind::Sobol,
             composite: Composite::Additive,
+            combine: Combine::Robust,
             backend: BackendChoice::Auto,
             exposure: Exposure::Ev(0.0),
             backdrop: Backdrop::Photograph(None),
@@ -64,6 +72,7 @@ impl Settings {
         self.estimator = flags.estimator.unwrap_or(self.estimator);
         self.sampler = flags.sampler.unwrap_or(self.sampler);
         self.composite = flags.composite.unwrap_or(self.composite);
+        self.combine = flags.combine.unwrap_or(self.combine);
         self.backend = flags.backend.unwrap_or(self.backend);
     }
 }
@@ -79,6 +88,7 @@ pub struct Overrides {
     pub estimator: Option<Estimator>,
     pub sampler: Option<SamplerKind>,
     pub composite: Option<Composite>,
+    pub combine: Option<Combine>,
     pub backend: Option<BackendChoice>,
 }
 
@@ -90,6 +100,7 @@ const KEYS: &[&str] = &[
     "estimator",
     "sampler",
     "composite",
+    "combine",
     "backend",
     "multiple_scattering",
 ];
@@ -122,6 +133,7 @@ pub(super) fn read_settings(
             estimator: table.optional("estimator", |node| node.choice())?,
             sampler: table.optional("sampler", |node| node.choice())?,
             composite: table.optional("composite", |node| node.choice())?,
+            combine: table.optional("combine", |node| node.choice())?,
             backend: table.optional("backend", |node| node.choice())?,
         });
     }

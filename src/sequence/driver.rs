@@ -11,7 +11,7 @@ use super::{Event, SequenceError, SequenceOptions};
 use crate::output::PngBits;
 use crate::pack::next_anchor;
 use crate::renderer::{
-    Budget, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
+    Budget, ErrorGoal, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
 };
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{
@@ -142,6 +142,7 @@ struct Started {
     camera: Camera,
     /// Not before the first posed frame.
     renderer: Option<Renderer>,
+    goal: Option<ErrorGoal>,
     scene: Option<Scene>,
     gpu: Option<GpuStages>,
     anchor: Option<DVec3>,
@@ -221,18 +222,21 @@ impl Sequence<'_> {
             scene.camera = camera.clone();
             let with = RendererOptions {
                 without: self.options.without,
+                filter: self.options.filter,
                 ..RendererOptions::default()
             };
+            let goal = self.options.goal.map(|goal| goal.of(&scene)).transpose()?;
             let renderer = Renderer::new(scene, with, &watcher.to_the_end())?;
             let estimator = renderer.scene().settings.estimator;
             let on_gpu = renderer.gpu_device().is_some();
-            for (saving, reason) in renderer.without().idle(estimator, on_gpu, None) {
+            for (saving, reason) in renderer.without().idle(estimator, on_gpu, goal.as_ref()) {
                 (self.hear)(&Event::Idle { saving, reason });
             }
             let seconds = renderer.seconds();
             self.seconds.compile += seconds.compile;
             self.seconds.first_build += begin.elapsed().as_secs_f64() - seconds.compile;
             started.gpu = renderer.gpu_device().cloned().map(GpuStages::new);
+            started.goal = goal.map(|goal| goal.without(renderer.without()));
             started.renderer = Some(renderer);
         }
         if there {
@@ -257,13 +261,16 @@ impl Sequence<'_> {
         )?;
         self.seconds.edit += begin.elapsed().as_secs_f64();
         let begin = Instant::now();
-        renderer.advance(Budget::Complete, watcher)?;
+        match &started.goal {
+            Some(goal) => renderer.render_to_error(goal, watcher)?,
+            None => renderer.advance(Budget::Complete, watcher)?,
+        }
         self.seconds.render += begin.elapsed().as_secs_f64();
         if watcher.is_cancelled() {
             return Ok(false);
         }
         let begin = Instant::now();
-        let picture = renderer.picture();
+        let picture = renderer.delivered().picture;
         self.seconds.composite += begin.elapsed().as_secs_f64();
         let copies = (renderer.scene().stages.motion_blur)
             .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);
@@ -331,6 +338,7 @@ impl Sequence<'_> {
             camera: scene.camera.clone(),
             seed: scene.settings.seed,
             renderer: None,
+            goal: None,
             scene: Some(scene),
             gpu: None,
             anchor: None,
@@ -355,6 +363,7 @@ impl Sequence<'_> {
         (env!("CARGO_PKG_VERSION"), scene.fingerprint()).add_to(&mut hash);
         (settings, &scene.stages).add_to(&mut hash);
         (without.names(), png_bits).add_to(&mut hash);
+        format!("{:?} {:?}", options.filter, options.goal).add_to(&mut hash);
         (&poses.entries, (poses.intrinsics, self.files.intrinsics)).add_to(&mut hash);
         (self.rate, (options.focus_pull_m, scope)).add_to(&mut hash);
         hash.finish()

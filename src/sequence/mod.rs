@@ -28,7 +28,7 @@ pub use driver::{RenderedSequence, render_sequence};
 pub use report::{FrameCounts, SequenceSeconds, SequenceStats};
 
 use crate::output::{OutputError, PngBits};
-use crate::renderer::{RenderError, Without};
+use crate::renderer::{Filter, Goal, RenderError, Without};
 use crate::scene::trajectory::TrajectoryError;
 use crate::scene::{Overrides, SceneError};
 use crate::video::VideoError;
@@ -42,6 +42,9 @@ pub struct SequenceOptions {
     pub overrides: Overrides,
     /// Savings to do without.
     pub without: Without,
+    /// Every frame is rendered to an error; nothing may move while the shutter is open.
+    pub goal: Option<Goal>,
+    pub filter: Option<Filter>,
     /// Folder of pictures, .y4m file, file of JPEG pictures one after the other, or `-` for Y4M on standard input. Only
     /// [`check_poses`] does without.
     pub frames: Option<PathBuf>,
@@ -79,6 +82,8 @@ impl SequenceOptions {
             scene: scene.into(),
             overrides: Overrides::default(),
             without: Without::default(),
+            goal: None,
+            filter: None,
             frames: Some(frames.into()),
             trajectory: trajectory.into(),
             intrinsics: None,

@@ -51,7 +51,7 @@ fn threads_do_not_matter(backend: BackendChoice) {
             .num_threads(threads)
             .build()
             .expect("a thread pool")
-            .install(|| bits(&render(scene, backend).picture()))
+            .install(|| bits(&render(scene, backend).delivered().picture))
     };
     let one = with_threads(&scene, 1);
     assert_eq!(one, with_threads(&scene, 2));
@@ -65,7 +65,7 @@ fn passes_do_not_matter(backend: BackendChoice) {
     for sampler in [SamplerKind::Sobol, SamplerKind::Jittered, SamplerKind::Cmj] {
         let mut scene = defocused();
         scene.settings.sampler = sampler;
-        let whole = bits(&render(&scene, backend).picture());
+        let whole = bits(&render(&scene, backend).delivered().picture);
         for step in [1, 3, 7] {
             let mut renderer = renderer(&scene, backend, RendererOptions::default());
             while renderer.samples() < RAYS {
@@ -73,7 +73,7 @@ fn passes_do_not_matter(backend: BackendChoice) {
             }
             assert_eq!(
                 whole,
-                bits(&renderer.picture()),
+                bits(&renderer.delivered().picture),
                 "{sampler:?}, {step} rays a pixel at a time"
             );
         }
@@ -81,7 +81,7 @@ fn passes_do_not_matter(backend: BackendChoice) {
         advance_by(&mut unfinished, u64::from(RAYS) - 1);
         assert_ne!(
             whole,
-            bits(&unfinished.picture()),
+            bits(&unfinished.delivered().picture),
             "control: a ray fewer shows"
         );
     }
@@ -109,6 +109,12 @@ fn largest_ulps(a: &Renderer, b: &Renderer) -> u64 {
         .map(|(&a, &b)| ulps(a, b))
         .max()
         .unwrap_or(0)
+}
+
+fn largest_difference(a: &Renderer, b: &Renderer) -> f32 {
+    let [a, b] = [a, b].map(|renderer| renderer.delivered().picture.linear);
+    let pairs = a.as_flattened().iter().zip(b.as_flattened());
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
 fn ranges_merge_to_the_whole(backend: BackendChoice) {
@@ -139,10 +145,12 @@ fn ranges_merge_to_the_whole(backend: BackendChoice) {
             let worst = largest_ulps(&whole, &merged);
             println!("{sampler:?}, cut at {first} and {second}: {worst} ulp");
             assert!(worst <= 2, "{worst} ulp");
+            let apart = largest_difference(&whole, &merged);
+            assert!(apart < 1e-6, "{apart} in what is delivered");
         }
         let part = range(0, RAYS - 1);
         assert!(
-            largest_ulps(&whole, &part) > 1000,
+            largest_ulps(&whole, &part) > 1000 && largest_difference(&whole, &part) > 1e-4,
             "control: a ray fewer shows"
         );
     }

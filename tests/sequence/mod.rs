@@ -4,6 +4,7 @@ mod animation;
 mod blur;
 mod copies;
 mod errors;
+mod flicker;
 mod frames;
 mod ranges;
 mod resume;

@@ -139,7 +139,9 @@ fn are_one_run(a: &Film, b: &Film) -> bool {
         let pixels = film.pixels.iter();
         let pixels = pixels
             .flat_map(|p| [p.m_im, p.diff, p.m_ir, p.r_ir, p.sq].map(|sum| sum.value().to_array()));
-        pixels.chain(guides).flatten().collect()
+        let groups = film.groups.iter();
+        let groups = groups.flat_map(|g| g.diff.map(|sum| sum.value().to_array()));
+        pixels.chain(guides).chain(groups).flatten().collect()
     };
     let near = |(a, b): (f64, f64)| (a - b).abs() <= TOLERANCE * a.abs().max(b.abs());
     a.pixels.iter().map(counts).eq(b.pixels.iter().map(counts))

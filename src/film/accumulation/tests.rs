@@ -116,6 +116,9 @@ fn ranges_that_do_not_fit_are_refused() {
     let mut with_photons = Film::new(3, 1, 4, true);
     with_photons.set_photons(true);
     assert_eq!(film.merge(&with_photons), Err(MergeError::Photons));
+    let mut with_groups = Film::new(3, 1, 4, true);
+    with_groups.set_groups(true);
+    assert_eq!(film.merge(&with_groups), Err(MergeError::Groups));
     assert_eq!(film, before);
 }
 

@@ -39,7 +39,7 @@ fn scramble(number: u32) -> Film {
 }
 
 fn mean_of(first: u32, count: u32, mode: Composite) -> Scrambles {
-    let mut sum = Scrambles::new(&Film::new(1, 1, 0, false), mode, vec![0]);
+    let mut sum = Scrambles::new(&Film::new(1, 1, 0, false), mode, false, vec![0]);
     for number in first..first + count {
         sum.add(&scramble(number));
     }
@@ -102,7 +102,12 @@ fn a_cleared_pixel_begins_anew() {
 
 #[test]
 fn equal_scrambles_state_no_error() {
-    let mut sum = Scrambles::new(&Film::new(1, 1, 0, false), Composite::Additive, vec![0]);
+    let mut sum = Scrambles::new(
+        &Film::new(1, 1, 0, false),
+        Composite::Additive,
+        false,
+        vec![0],
+    );
     for _ in 0..16 {
         sum.add(&scramble(3));
     }

@@ -25,13 +25,18 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ),
     (
         "film::sums",
-        "sum_merge merge value depth",
+        "sum_merge merge value from depth",
         "films are merged and read on the host",
     ),
     (
         "film::sums",
         "add add_nothing",
         "the CPU's samples come as records; the host counts those out of reach",
+    ),
+    (
+        "film::groups",
+        "values merge",
+        "films are merged and read on the host",
     ),
     ("camera::lens", "xyz", "WGSL writes v.xyz"),
     (
@@ -62,8 +67,8 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ),
     (
         "cpu::estimator",
-        "is_without_turn",
-        "the host counts what it need not send",
+        "is_without_turn evaluations_before",
+        "the host counts what it need not send, and evaluations",
     ),
     (
         "cpu::sharing",
@@ -160,6 +165,11 @@ const OTHER_ARGUMENTS: &[(&str, &str, &str)] = &[
     (
         "film::sums",
         "two_sum sum_add sum3_add pixel_add pixel_add_real guide_add",
+        "`zero` hides intermediate sums from shader compilers",
+    ),
+    (
+        "film::groups",
+        "group_add",
         "`zero` hides intermediate sums from shader compilers",
     ),
     (

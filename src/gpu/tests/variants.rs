@@ -65,6 +65,7 @@ fn kernels_bind_what_they_use_and_no_more() {
     let accumulate: BTreeSet<String> = set(&[
         "frame",
         "batch",
+        "group_sums",
         "guide_sums",
         "path_first_hits",
         "path_firsts",

@@ -7,7 +7,7 @@ use bytemuck::Zeroable;
 use glam::Vec3;
 
 use super::{MIX, mix};
-use crate::film::{Film, Sample, guide_add};
+use crate::film::{Film, Sample, group_add, guide_add};
 use crate::gpu::harness::test_device;
 use crate::gpu::*;
 use crate::packed::Frame;
@@ -17,7 +17,9 @@ use crate::work::{Pass, PixelWork, RayCounts, Watcher, WorkList};
 const ESTIMATOR: &str = "
 import package::gpu::buffers::frame;
 import package::cpu::state::{PathState, STAGE_DONE, path_first_hits, path_results, path_state};
+import package::shared::NONE;
 import package::toy::mix_bits;
+fn evaluation(pixel: u32, index: u32) -> u32 { return select(index, NONE, (pixel + index) % 3u == 0u); }
 fn begin_sample(lane: u32, pixel: u32, index: u32, real_pass: bool) -> PathState {
     var st = path_state(lane, pixel, index);
     st.path.stage = select(1u, 2u, real_pass);
@@ -99,6 +101,12 @@ fn toy_render(seed: u32, film: &mut Film, work: &WorkList) -> u64 {
                 film.add_real(pixel, sample.is_virtual, sample.contribution);
             } else {
                 film.add(pixel, &sample);
+                if let Some(groups) = film.groups.get_mut(pixel)
+                    && !sample.is_virtual
+                    && !(w.pixel + index).is_multiple_of(3)
+                {
+                    group_add(groups, index, sample.contribution);
+                }
                 if let Some(guide) = film.guides.get_mut(pixel)
                     && rays > 0
                 {
@@ -155,6 +163,7 @@ fn real_work(pixels: Vec<PixelWork>) -> WorkList {
 fn passes_give_the_bits_of_the_twin_however_they_are_cut() {
     let Some(gpu) = test_device() else { return };
     let mut expected = Film::new(WIDTH, HEIGHT, 0, true);
+    expected.set_groups(true);
     let mut rays = 0;
     for end in [9, 30] {
         let work = work_to(&expected, end);
@@ -162,6 +171,7 @@ fn passes_give_the_bits_of_the_twin_however_they_are_cut() {
     }
 
     let mut film = Film::new(WIDTH, HEIGHT, 0, true);
+    film.set_groups(true);
     let mut backend = toy_backend(gpu, 7);
     let mut traced = RayCounts::default();
     for end in [2, 9, 30] {

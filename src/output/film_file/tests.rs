@@ -1,5 +1,5 @@
 use super::*;
-use crate::film::{Sample, Splat, guide_add, planes};
+use crate::film::{Sample, Splat, group_add, guide_add, planes};
 use crate::output::film_note::tests::note;
 use crate::scene::{Camera, Composite, Estimator, SamplerKind};
 use glam::Vec3;
@@ -23,6 +23,12 @@ fn film() -> Film {
             }
         }
     }
+    film.set_groups(true);
+    for (i, groups) in film.groups.iter_mut().enumerate() {
+        for evaluation in 0..9 {
+            group_add(groups, evaluation, Vec3::new(1e9, 0.1, -1e-7) * i as f32);
+        }
+    }
     film.set_photons(true);
     let splats = (0..60).map(|i| Splat {
         pixel: i % 5,
@@ -31,6 +37,14 @@ fn film() -> Film {
     });
     film.add_splats((1 << 33) + 5, splats);
     film
+}
+
+fn note_of(film: &Film) -> FilmNote {
+    let combine = match film.groups.is_empty() {
+        true => Combine::Mean,
+        false => Combine::Robust,
+    };
+    FilmNote { combine, ..note() }
 }
 
 fn written(film: &Film) -> (tempfile::TempDir, Target) {
@@ -62,7 +76,7 @@ fn written(film: &Film) -> (tempfile::TempDir, Target) {
         &planes(film, None),
         &metadata,
         film,
-        &note(),
+        &note_of(film),
     )
     .unwrap();
     (folder, target)
@@ -80,6 +94,7 @@ fn a_film_survives_its_file_bit_for_bit() {
     let mut plain = film.clone();
     plain.guides.clear();
     plain.set_photons(false);
+    plain.set_groups(false);
     let (_folder, target) = written(&plain);
     assert_eq!(read_film(target.path()).unwrap().0, plain);
 }
@@ -87,7 +102,7 @@ fn a_film_survives_its_file_bit_for_bit() {
 #[test]
 fn sums_that_are_not_finite_are_refused() {
     type Damage = fn(&mut Film);
-    let damages: [(&str, Damage); 4] = [
+    let damages: [(&str, Damage); 5] = [
         ("sums.m_im.hi.G of pixel (1, 1) is NaN", |f| {
             f.pixels[4].m_im.hi[1] = f32::NAN
         }),
@@ -96,6 +111,9 @@ fn sums_that_are_not_finite_are_refused() {
         }),
         ("sums.r_ir.hi.R of pixel (0, 0) is -inf", |f| {
             f.pixels[0].r_ir.hi[0] = f32::NEG_INFINITY
+        }),
+        ("sums.diff_3.hi.B of pixel (1, 0) is inf", |f| {
+            f.groups[1].diff[3].hi[2] = f32::INFINITY
         }),
         ("sums.depth.hi.Z of pixel (0, 1) is NaN", |f| {
             f.guides[3].depth_hi = f32::NAN

@@ -13,6 +13,7 @@ pub(in crate::output) fn note() -> FilmNote {
         estimator: Estimator::Paper,
         sampler: SamplerKind::Cmj,
         composite: Composite::Quotient,
+        combine: Combine::Robust,
         without: [Skip::Plan, Skip::LastVertex].into_iter().collect(),
     }
 }
@@ -50,8 +51,8 @@ fn notes_that_this_program_did_not_write_are_refused() {
     let read = |text: &str| FilmNote::from_text(text, Path::new("."));
     assert_eq!(read(&text), Ok(note()), "control");
     for (from, to, part) in [
-        ("\"form\":3", "\"form\":4", "form 4; expected form 3"),
-        ("\"form\":3,", "", "missing field `form`"),
+        ("\"form\":4", "\"form\":3", "form 3; expected form 4"),
+        ("\"form\":4,", "", "missing field `form`"),
         ("\"paper\"", "\"papers\"", "\"papers\" is not known"),
         ("plan", "plans", "plans"),
         ("[7,47]", "[47,7]", "rays 47..7 of 100"),
@@ -68,7 +69,7 @@ fn notes_that_this_program_did_not_write_are_refused() {
 fn every_difference_is_a_mismatch() {
     assert_eq!(note().mismatch(&note()), None);
     type Change = fn(&mut FilmNote);
-    let changes: [(&str, Change); 9] = [
+    let changes: [(&str, Change); 10] = [
         ("version", |n| n.version.push('1')),
         ("rays per pixel", |n| n.total = 99),
         ("seed", |n| n.seed = 0),
@@ -76,6 +77,7 @@ fn every_difference_is_a_mismatch() {
         ("estimator", |n| n.estimator = Estimator::Direct),
         ("sampler", |n| n.sampler = SamplerKind::Sobol),
         ("composite", |n| n.composite = Composite::Additive),
+        ("combination", |n| n.combine = Combine::Mean),
         ("--no-skip", |n| n.without = Without::default()),
         ("scenes", |n| n.fingerprint.push('0')),
     ];

@@ -86,11 +86,15 @@ impl Renderer {
         let frame = core.packed.frame;
         core.packed.frame.rays_total = 1;
         core.film.first_sample = 0;
+        // The groups are whole scrambles.
+        let grouped = !core.film.groups.is_empty();
+        core.film.set_groups(false);
         let mut driver = ToError {
             tiles: Tiles::of(core.film.width as usize, core.film.height as usize),
             goal: goal.without(core.options.without),
             watcher: *watcher,
             begin: stopwatch.begin,
+            grouped,
             done: 0,
             expected: 2 * TRIAL_SCRAMBLES + SCRAMBLES,
             planned: (
@@ -122,6 +126,8 @@ impl Renderer {
 pub(super) struct ToError<'a> {
     pub core: &'a mut Core,
     pub tiles: Tiles,
+    /// The sum of scrambles has groups.
+    pub grouped: bool,
     pub watcher: Watcher<'a>,
     pub begin: Instant,
     /// Scrambles completed and expected.

@@ -59,7 +59,12 @@ impl ToError<'_> {
         let active = (0..pixels.len()).filter(|&pixel| is_within_reach(&pixels[pixel]));
         let active = active.map(|pixel| pixel as u32).collect();
         let mut series = Series {
-            sum: Scrambles::new(&core.film, core.scene.settings.composite, active),
+            sum: Scrambles::new(
+                &core.film,
+                core.scene.settings.composite,
+                self.grouped,
+                active,
+            ),
             taken: Vec::new(),
         };
         if !core.nothing_to_trace() {

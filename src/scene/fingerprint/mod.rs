@@ -13,7 +13,7 @@ use super::{Scene, Settings};
 impl Scene {
     /// 32 hexadecimal digits of everything that the converged film depends on, contents of all files included: geometry, materials, textures,
     /// photograph, lights, camera, lens, exposure, path depth. How it is sampled (rays per pixel, seed, estimator, sampler, backend), the
-    /// composite, the camera stages, names and places on disk do not matter. The same on every machine.
+    /// composite and its combination, the camera stages, names and places on disk do not matter. The same on every machine.
     pub fn fingerprint(&self) -> String {
         let mut hash = ContentHash::default();
         let Settings {
@@ -27,6 +27,7 @@ impl Scene {
             estimator: _,
             sampler: _,
             composite: _,
+            combine: _,
             backend: _,
         } = &self.settings;
         let Self {

@@ -4,9 +4,9 @@ use super::{Content, ContentHash, content, content_by_name};
 use crate::scene::animation::{AnimatedNode, Animation, InstanceAnimation, Interpolation, Track};
 use crate::scene::trajectory::{Entry, EntryKey, Intrinsics};
 use crate::scene::{
-    AlphaMode, Aperture, Backdrop, BackendChoice, Camera, Composite, Environment, EnvironmentMap,
-    Estimator, Exposure, Instance, Lens, Light, LightKind, MotionKey, Object, Photo, Primitive,
-    SamplerKind, Settings, Shutter, Side, Texture, TextureRef, Wrap,
+    AlphaMode, Aperture, Backdrop, BackendChoice, Camera, Combine, Composite, Environment,
+    EnvironmentMap, Estimator, Exposure, Instance, Lens, Light, LightKind, MotionKey, Object,
+    Photo, Primitive, SamplerKind, Settings, Shutter, Side, Texture, TextureRef, Wrap,
 };
 
 content! {
@@ -30,14 +30,14 @@ content! {
     TextureRef { texture, uv_set, transform }
     Texture { width, height, rgba8, wrap_u, wrap_v, nearest; name }
 
-    Settings { rays_per_pixel, max_bounces, clamp_indirect, seed, estimator, sampler, composite, backend, exposure, backdrop, multiple_scattering }
+    Settings { rays_per_pixel, max_bounces, clamp_indirect, seed, estimator, sampler, composite, combine, backend, exposure, backdrop, multiple_scattering }
 
     Intrinsics { size, fx, fy, cx, cy, distortion }
     Entry { key, time_secs, world_from_camera, intrinsics, focus_distance_m; place }
 }
 
 content_by_name! {
-    Estimator SamplerKind Composite BackendChoice
+    Estimator SamplerKind Composite Combine BackendChoice
 }
 
 /// [`Content`] of what is one of several things: which, and what that holds.

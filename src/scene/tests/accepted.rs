@@ -38,6 +38,7 @@ fn the_shortest_scene_has_the_stated_defaults() {
             estimator: Estimator::Direct,
             sampler: SamplerKind::Sobol,
             composite: Composite::Additive,
+            combine: Combine::Robust,
             backend: BackendChoice::Auto,
             multiple_scattering: true,
             exposure: Exposure::Ev(0.0),
@@ -184,7 +185,7 @@ radiance = [10, 10, 10]
 #[test]
 fn settings_and_flags() {
     let mut settings = load_with_camera(
-        "[render]\nrays_per_pixel = 9\nmax_bounces = 1\nclamp_indirect = 2.5\nseed = 4294967295\nestimator = \"paper\"\nsampler = \"jittered\"\ncomposite = \"quotient\"\nbackend = \"cpu\"\n[photo]\nexposure_ev = -1\n",
+        "[render]\nrays_per_pixel = 9\nmax_bounces = 1\nclamp_indirect = 2.5\nseed = 4294967295\nestimator = \"paper\"\nsampler = \"jittered\"\ncomposite = \"quotient\"\ncombine = \"mean\"\nbackend = \"cpu\"\n[photo]\nexposure_ev = -1\n",
     )
     .settings;
     let from_file = Settings {
@@ -195,6 +196,7 @@ fn settings_and_flags() {
         estimator: Estimator::Paper,
         sampler: SamplerKind::Jittered,
         composite: Composite::Quotient,
+        combine: Combine::Mean,
         backend: BackendChoice::Cpu,
         multiple_scattering: true,
         exposure: Exposure::Ev(-1.0),
