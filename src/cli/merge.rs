@@ -10,7 +10,7 @@ use super::scene_flags::SceneFlags;
 use super::values::png_bits;
 use super::{Failure, Outcome, print, say};
 use crate::film::Film;
-use crate::output::{FilmNote, PngBits, Target, read_film};
+use crate::output::{ExrLayers, FilmNote, PngBits, Target, read_film};
 use crate::renderer::{Progress, Renderer, Watcher};
 use crate::scene::sandbox::Sandbox;
 use crate::scene::{BackendChoice, Scene};
@@ -85,6 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     write(
         &renderer,
         &targets,
+        &ExrLayers::all(),
         arguments.png_bits,
         arguments.frame,
         (!complete).then_some(range),

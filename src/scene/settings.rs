@@ -1,6 +1,7 @@
 //! `[render]`, and the flags that win over it.
 
 use super::error::Result;
+use super::photo::PhotoSettings;
 use super::reader::{Choice, Node, Table};
 use super::{BackendChoice, Composite, Estimator, Exposure, SamplerKind, Settings, Side};
 
@@ -44,6 +45,7 @@ impl Default for Settings {
             composite: Composite::Additive,
             backend: BackendChoice::Auto,
             exposure: Exposure::Ev(0.0),
+            upright_photo: false,
         }
     }
 }
@@ -92,9 +94,10 @@ const KEYS: &[&str] = &[
 ];
 
 /// `[render]`; the exposure stands in `[photo]`.
-pub(super) fn read_settings(root: &Table, exposure: Exposure) -> Result<Settings> {
+pub(super) fn read_settings(root: &Table, photo: PhotoSettings) -> Result<Settings> {
     let mut settings = Settings {
-        exposure,
+        exposure: photo.exposure,
+        upright_photo: photo.upright_photo,
         ..Settings::default()
     };
     if let Some(table) = root.table("render", "[render]", KEYS)? {

@@ -7,9 +7,9 @@ mod y4m_file;
 mod yuv;
 
 pub use sink::{FrameSink, SinkPlan};
-pub use source::{FrameRange, FrameSource, Pixels, VideoFrame};
+pub use source::{FrameRange, FrameSource, Pixels, Taken, VideoFrame};
 pub use y4m::{Chroma, Header, Y4mReader};
-pub use yuv::{decode_yuv, encode_yuv};
+pub use yuv::{Matrix, decode_yuv, encode_yuv};
 
 use std::path::{Path, PathBuf};
 

@@ -26,6 +26,7 @@ impl Scene {
             sampler: _,
             composite: _,
             backend: _,
+            upright_photo: _,
         } = &self.settings;
         let Self {
             name: _,

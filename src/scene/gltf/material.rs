@@ -13,6 +13,8 @@ use serde::Deserialize;
 use super::container::{clip, malformed};
 use super::document::Document;
 use super::image::Textures;
+use super::specular_glossiness;
+use super::uv_sets::{UvSets, uv_sets};
 use super::{Note, Notes, Problem};
 use crate::scene::{AlphaMode, Material, Primitive, TextureRef};
 
@@ -91,6 +93,7 @@ impl<'a> Materials<'a> {
         notes: &mut Notes,
     ) -> Result<Material, Problem> {
         let mut slots = Slots {
+            sets: uv_sets(source, at)?,
             textures: &mut self.textures,
             at,
             notes,
@@ -187,6 +190,9 @@ fn read_extensions(
         }
         material.attenuation_distance_m = distance;
     }
+    if let Some(value) = extensions.others.get(specular_glossiness::NAME) {
+        specular_glossiness::convert(value, material, slots)?;
+    }
     if let Some(value) = extensions.others.get("KHR_materials_clearcoat") {
         let coat = Clearcoat::deserialize(value).map_err(|error| {
             malformed(
@@ -211,18 +217,23 @@ fn read_extensions(
 }
 
 /// Reads the factors and textures of one material.
-struct Slots<'s, 'd> {
+pub(super) struct Slots<'s, 'd> {
+    sets: UvSets,
     textures: &'s mut Textures<'d>,
-    at: &'s str,
+    pub(super) at: &'s str,
     notes: &'s mut Notes,
 }
 
 impl Slots<'_, '_> {
-    fn unit<const N: usize>(&mut self, name: &str, values: [f32; N]) -> Result<[f32; N], Problem> {
+    pub(super) fn unit<const N: usize>(
+        &mut self,
+        name: &str,
+        values: [f32; N],
+    ) -> Result<[f32; N], Problem> {
         self.limited(name, values, 1.0)
     }
 
-    fn unit1(&mut self, name: &str, value: f32) -> Result<f32, Problem> {
+    pub(super) fn unit1(&mut self, name: &str, value: f32) -> Result<f32, Problem> {
         self.limited1(name, value, 1.0)
     }
 
@@ -247,7 +258,11 @@ impl Slots<'_, '_> {
         Ok(clamped)
     }
 
-    fn texture(&mut self, slot: &str, info: &Option<Info>) -> Result<Option<TextureRef>, Problem> {
+    pub(super) fn texture(
+        &mut self,
+        slot: &str,
+        info: &Option<Info>,
+    ) -> Result<Option<TextureRef>, Problem> {
         let Some(info) = info else { return Ok(None) };
         let transform = info
             .extensions
@@ -295,12 +310,7 @@ impl Slots<'_, '_> {
         let uv_set = transform
             .and_then(|transform| transform.tex_coord)
             .unwrap_or(tex_coord);
-        if uv_set > 1 {
-            return Err(malformed(
-                at,
-                format!("uses texture coordinate set {uv_set}; mixray reads sets 0 and 1"),
-            ));
-        }
+        let uv_set = u32::from(uv_set != self.sets[0]);
         let rows = transform.map_or([1.0, 0.0, 0.0, 0.0, 1.0, 0.0], transform_rows);
         if !rows.iter().all(|value| value.is_finite()) {
             return Err(malformed(at, "its texture transform is not finite"));

@@ -17,7 +17,7 @@ fn the_shortest_scene_has_the_stated_defaults() {
     // Half the height over the tangent of 22.5 degrees, sqrt(2) - 1.
     assert!((camera.fy - 24.0 / (2.0_f64.sqrt() - 1.0)).abs() < 1e-9);
     assert_eq!(camera.fx, camera.fy);
-    assert_eq!(camera.distortion, [0.0; 5]);
+    assert!(camera.distortion.is_none());
     assert_eq!(camera.world_from_camera, DMat4::IDENTITY);
     assert_eq!(
         scene.lens,
@@ -40,6 +40,7 @@ fn the_shortest_scene_has_the_stated_defaults() {
             composite: Composite::Additive,
             backend: BackendChoice::Auto,
             exposure: Exposure::Ev(0.0),
+            upright_photo: false,
         }
     );
 }
@@ -195,6 +196,7 @@ fn settings_and_flags() {
         composite: Composite::Quotient,
         backend: BackendChoice::Cpu,
         exposure: Exposure::Ev(-1.0),
+        upright_photo: false,
     };
     assert_eq!(settings, from_file);
     settings.apply(&Overrides::default());
