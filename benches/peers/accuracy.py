@@ -27,23 +27,27 @@ BLOCK_PX = 8
 
 class Reference:
     def __init__(self, name):
-        folder = mixray_run.ROOT
-        layers, self.rays_per_pixel = read_reference(folder / "tests" / "references" / f"{name}.exr")
-        camera_height = PeerScene(folder / "scenes" / name / "scene.toml").height
-        self.scene = PeerScene(folder / "scenes" / name / "scene.toml", camera_height // layers["mask.Y"].shape[0])
+        layers, self.rays_per_pixel, integrator = read_reference(mixray_run.reference_file(name))
+        path = mixray_run.scene_file(name)
+        self.scene = PeerScene(path, PeerScene(path).height // layers["mask.Y"].shape[0])
         self.name = name
         mask = layers["mask.Y"][..., None]
         ic = 0.0 if self.scene.photo is None else self.scene.photo
         self.mask = mask
         self.composite = mixray_run.rgb(layers) + (1.0 - mask) * ic
         self.error = mixray_run.rgb(layers, "error")
+        # Light tracers see nothing smooth.
+        self.background = layers["mask.Y"] == 0.0
+        self.known = self.background if integrator == "ptracer" else np.full(self.background.shape, True)
 
 
 def read_reference(path):
     bitmap = mi.Bitmap(str(path))
     planes = np.array(bitmap).astype(np.float64)
     names = [field.name for field in bitmap.struct_()]
-    return {name: planes[..., i] for i, name in enumerate(names)}, bitmap.metadata()["raysPerPixel"]
+    metadata = bitmap.metadata()
+    integrator = metadata["integrator"] if "integrator" in metadata else "path"
+    return {name: planes[..., i] for i, name in enumerate(names)}, metadata["raysPerPixel"], integrator
 
 
 def cpu_secs():
@@ -84,11 +88,11 @@ def converge(reference, arguments):
     images, _ = mixray_composites(
         reference, arguments.runs, rays_per_pixel=arguments.rays_per_pixel, backend=arguments.backend
     )
-    error = images.mean(0) - reference.composite
+    error = (images.mean(0) - reference.composite) * reference.known[..., None]
     scale = reference.composite.mean()
-    mixray_error = images.mean((1, 2, 3)).std(ddof=1) / np.sqrt(arguments.runs)
-    reference_error = np.sqrt((reference.error**2).sum()) / error.size
-    variance = images.var(0, ddof=1) / arguments.runs + reference.error**2
+    mixray_error = (images * reference.known[..., None]).mean((1, 2, 3)).std(ddof=1) / np.sqrt(arguments.runs)
+    reference_error = np.sqrt((reference.error**2 * reference.known[..., None]).sum()) / error.size
+    variance = (images.var(0, ddof=1) / arguments.runs + reference.error**2) * reference.known[..., None]
     z = blocks(error) / np.sqrt(blocks(variance)).clip(1e-12)
     if arguments.images:
         amplified = np.clip(0.5 + arguments.gain * error, 0.0, 1.0)
@@ -118,10 +122,11 @@ def equal_rays(reference, arguments):
         contenders[f"mixray, {estimator}, {sampler}"] = mixray_composites(
             reference, runs, timed=True, rays_per_pixel=rays_per_pixel, estimator=estimator, sampler=sampler, backend=arguments.backend
         )
-    noise = (reference.error**2).mean()
+    known = reference.known
+    noise = (reference.error[known] ** 2).mean()
     rows = []
     for name, (images, secs) in contenders.items():
-        per_run = ((images - reference.composite) ** 2).mean((1, 2, 3)) - noise
+        per_run = ((images - reference.composite)[:, known] ** 2).mean((1, 2)) - noise
         squared = per_run.mean()
         spread = per_run.std(ddof=1) / np.sqrt(runs)
         root = np.sqrt(squared)

@@ -9,6 +9,9 @@ Two passes and a mask with the same seeds, in batches. The file holds, in half f
     R, G, B           composite of Eq. 4 without its photograph: the whole is this + (1 - mask) * Ic
     mask.Y            the fraction of primary rays that meet virtual geometry first
     error.R, .G, .B   standard error of the composite, from the spread of the batches and the rounding to half floats
+
+`--integrator ptracer` starts paths at the lights and finds what those from the camera miss. It sees nothing smooth, so that such a reference, marked
+by the attribute `integrator`, speaks only of pixels that no virtual object touches.
 """
 
 import argparse
@@ -32,10 +35,11 @@ def main():
     parser.add_argument("scene")
     parser.add_argument("--shrink", type=int, default=2, help="divides the picture's sides (default 2)")
     parser.add_argument("--rays-per-pixel", type=int, required=True)
+    parser.add_argument("--integrator", choices=["path", "ptracer"], default="path")
     parser.add_argument("-o", "--output", required=True)
     arguments = parser.parse_args()
     scene = PeerScene(arguments.scene, arguments.shrink)
-    passes = Passes(scene, "multijitter", BATCH_RAYS_PER_PIXEL)
+    passes = Passes(scene, "multijitter", BATCH_RAYS_PER_PIXEL, arguments.integrator)
     batches = max(2, arguments.rays_per_pixel // BATCH_RAYS_PER_PIXEL)
     sums = [0.0, 0.0, 0.0]
     composite_sum = square_sum = 0.0
@@ -54,6 +58,7 @@ def main():
     names = ["R", "G", "B", "mask.Y", "error.R", "error.G", "error.B"]
     bitmap = mi.Bitmap(planes, pixel_format=mi.Bitmap.PixelFormat.MultiChannel, channel_names=names)
     bitmap.metadata()["raysPerPixel"] = batches * BATCH_RAYS_PER_PIXEL
+    bitmap.metadata()["integrator"] = arguments.integrator
     bitmap.metadata()["renderer"] = f"Mitsuba {mi.__version__}"
     bitmap.write(arguments.output)
     print(

@@ -382,12 +382,18 @@ class PeerScene:
             for triangles, object_from_local in parts:
                 yield entry, triangles.placed(object_matrix(entry) @ object_from_local)
 
-    def world(self, mixed, sampler, rays_per_pixel):
-        """The real world, or with the virtual things in it the mixed one."""
+    def has_caustics(self):
+        """Something virtual is smooth metal or glass."""
+        materials = [entry.get("material", {}) for entry in self.toml.get("virtual", [])]
+        smooth = (m for m in materials if m.get("roughness", 1.0) == 0.0)
+        return any(max(m.get("metallic", 0.0), m.get("transmission", 0.0)) > 0.0 for m in smooth)
+
+    def world(self, mixed, sampler, rays_per_pixel, integrator="path"):
+        """The real world, or with the virtual things in it the mixed one; `integrator` is "path", or "ptracer" from the lights' side."""
         scene = {
             "type": "scene",
             "integrator": {
-                "type": "path",
+                "type": integrator,
                 # Mitsuba counts the emitter's own vertex: 2 is direct light.
                 "max_depth": self.max_bounces + 1,
                 "rr_depth": NEVER,
@@ -445,9 +451,9 @@ class Mask(mi.SamplingIntegrator):
 class Passes:
     """The two passes and the mask, with one seed: the same primary rays in each."""
 
-    def __init__(self, scene, sampler, rays_per_pixel):
-        self.mixed_world = scene.world(True, sampler, rays_per_pixel)
-        self.real_world = scene.world(False, sampler, rays_per_pixel)
+    def __init__(self, scene, sampler, rays_per_pixel, integrator="path"):
+        self.mixed_world = scene.world(True, sampler, rays_per_pixel, integrator)
+        self.real_world = scene.world(False, sampler, rays_per_pixel, integrator)
         self.mask_integrator = Mask(mi.Properties())
 
     def mask(self, seed):

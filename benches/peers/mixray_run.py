@@ -12,6 +12,16 @@ ROOT = Path(__file__).resolve().parents[2]
 BINARY = ROOT / "target" / "release" / "mixray"
 
 
+def scene_file(name):
+    """`FOLDER` of scenes/, or `FOLDER/FILE` for another scene file in it."""
+    folder, _, file = name.partition("/")
+    return ROOT / "scenes" / folder / f"{file or 'scene'}.toml"
+
+
+def reference_file(name):
+    return ROOT / "tests" / "references" / f"{name.replace('/', '_')}.exr"
+
+
 def _value(v):
     if isinstance(v, bool):
         return "true" if v else "false"

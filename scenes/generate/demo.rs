@@ -37,7 +37,7 @@ pub fn generate(folder: &Path) -> Result<(), Box<dyn Error>> {
     environment::write_exr(&environment::room_with_window(), &folder.join("env.exr"))?;
     write_proxy(folder)?;
     write_virtual(folder)?;
-    let mut scene = real_scene(folder)?;
+    let mut scene = real_scene(&folder.join("scene.toml"))?;
     scene.objects = things().into_iter().map(object).collect();
     photograph(scene, PHOTO_RAYS, SENSOR, &folder.join("photo.png"))
 }

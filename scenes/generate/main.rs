@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release --example generate_scenes [NAME...]`, names of scenes; all of them without one.
 
+mod caustics;
 mod demo;
 mod environment;
 mod glb;
@@ -29,6 +30,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     if wanted("far") {
         photograph_proxy(&folder("far"))?;
     }
+    if wanted("caustics") {
+        let folder = folder("caustics");
+        caustics::write_ring(&folder)?;
+        photograph_proxy(&folder)?;
+        photograph_real(&folder.join("sun.toml"), &folder.join("photo_sun.png"))?;
+    }
     if wanted("sunny") {
         let folder = folder("sunny");
         environment::write_exr(&environment::sunny_sky(), &folder.join("sky.exr"))?;
@@ -43,13 +50,12 @@ fn folder(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// Takes the photograph of a scene's own proxy: a perfect one.
+/// Takes the photograph of a folder's own proxy: a perfect one.
 fn photograph_proxy(folder: &Path) -> Result<(), Box<dyn Error>> {
-    let scene = real_scene(folder)?;
-    photograph(
-        scene,
-        TEST_PHOTO_RAYS,
-        Sensor::NOISELESS,
-        &folder.join("photo.png"),
-    )
+    photograph_real(&folder.join("scene.toml"), &folder.join("photo.png"))
+}
+
+fn photograph_real(scene_file: &Path, photo: &Path) -> Result<(), Box<dyn Error>> {
+    let scene = real_scene(scene_file)?;
+    photograph(scene, TEST_PHOTO_RAYS, Sensor::NOISELESS, photo)
 }

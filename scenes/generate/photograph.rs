@@ -24,9 +24,10 @@ impl Sensor {
     };
 }
 
-/// The real things of a folder's scene file, without its photograph.
-pub fn real_scene(folder: &Path) -> Result<Scene, Box<dyn Error>> {
-    let text = std::fs::read_to_string(folder.join("scene.toml"))?;
+/// The real things of a scene file, without its photograph.
+pub fn real_scene(scene_file: &Path) -> Result<Scene, Box<dyn Error>> {
+    let text = std::fs::read_to_string(scene_file)?;
+    let folder = scene_file.parent().unwrap_or(Path::new("."));
     let mut file = tempfile::Builder::new()
         .suffix(".toml")
         .tempfile_in(folder)?;

@@ -70,6 +70,8 @@ struct Expected {
     near_share: f32,
     difference: Moments,
     mixed: Moments,
+    /// Squared error of a sample's light by way of smooth virtual surfaces.
+    highlight: f32,
     least_difference_rate: f32,
 }
 
@@ -82,13 +84,24 @@ impl Expected {
         }
     }
 
+    /// Small lamps that are seen in smooth objects raise the rate where they are, and lower it nowhere: they take few pixels.
+    fn with_highlights(mut self) -> Self {
+        self.mixed.error += self.highlight;
+        self
+    }
+
     fn mean(&self, difference: f32, mixed: f32) -> f32 {
         (1.0 - self.mixed_share) * difference + self.mixed_share * mixed
     }
 }
 
-/// The rates of each block: the wanted error at least cost, but not more samples in all than one a ray.
-pub fn allocate(blocks: &Blocks, measured: &[BlockMoments], importance: &[f32]) -> Vec<Rates> {
+/// The rates of each block: the wanted error at least cost, but not more samples in all than one a ray, highlights apart.
+pub fn allocate(
+    blocks: &Blocks,
+    measured: &[BlockMoments],
+    importance: &[f32],
+    highlights: &[f32],
+) -> Vec<Rates> {
     let difference: Vec<Moments> = measured.iter().map(|m| m.difference).collect();
     let mixed: Vec<Moments> = measured.iter().map(|m| m.mixed).collect();
     let difference = smooth(blocks, &difference);
@@ -96,14 +109,18 @@ pub fn allocate(blocks: &Blocks, measured: &[BlockMoments], importance: &[f32]) 
     let expected: Vec<Expected> = measured
         .iter()
         .zip(difference.into_iter().zip(mixed))
-        .zip(importance)
-        .map(|((m, (difference, mixed)), importance)| Expected {
-            mixed_share: m.mixed.pixels / (m.mixed.pixels + m.difference.pixels).max(1.0),
-            near_share: m.near_share,
-            difference,
-            mixed,
-            least_difference_rate: (IMPORTANCE_SHARE * importance).clamp(1.0 / LONGEST_PERIOD, 1.0),
-        })
+        .zip(importance.iter().zip(highlights))
+        .map(
+            |((m, (difference, mixed)), (importance, &highlight))| Expected {
+                mixed_share: m.mixed.pixels / (m.mixed.pixels + m.difference.pixels).max(1.0),
+                near_share: m.near_share,
+                difference,
+                mixed,
+                highlight,
+                least_difference_rate: (IMPORTANCE_SHARE * importance)
+                    .clamp(1.0 / LONGEST_PERIOD, 1.0),
+            },
+        )
         .collect();
     let error_of_one: f32 = expected
         .iter()
@@ -124,7 +141,9 @@ pub fn allocate(blocks: &Blocks, measured: &[BlockMoments], importance: &[f32]) 
         error <= ERROR_SHARE * error_of_one || samples >= expected.len() as f32
     };
     let gain = least_gain(is_enough);
-    expected.iter().map(|e| e.rates(gain)).collect()
+    (expected.into_iter())
+        .map(|e| e.with_highlights().rates(gain))
+        .collect()
 }
 
 /// Smallest gain that is enough, within a thousandth: rates and their effect rise with it.

@@ -7,6 +7,7 @@
 mod allocation;
 mod beam;
 mod blocks;
+mod highlights;
 mod importance;
 mod measurement;
 
@@ -97,8 +98,8 @@ pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
             .map(|&importance| Rates::from_importance(importance))
             .collect()
     } else {
-        let measured = measure(scene, &blocks, &flags, meter);
-        allocate(&blocks, &measured, &importances)
+        let (measured, highlights) = measure(scene, &blocks, &flags, meter);
+        allocate(&blocks, &measured, &importances, &highlights)
     };
     scene.pixels = (0..flags.len())
         .map(|pixel| rates[blocks.of_pixel(pixel)].pixel(flags[pixel]))
@@ -146,12 +147,13 @@ fn flags_of(scene: &PackedScene, beam: &Beam) -> u32 {
     }
 }
 
+/// What samples scatter and cost, and the squared errors of highlights, by blocks.
 fn measure(
     scene: &mut PackedScene,
     blocks: &Blocks,
     flags: &[u32],
     meter: &Meter<'_>,
-) -> Vec<measurement::BlockMoments> {
+) -> (Vec<measurement::BlockMoments>, Vec<f32>) {
     let frame = scene.frame;
     scene.frame.seed = if scene.frame.seed == SEED {
         !SEED
@@ -173,8 +175,13 @@ fn measure(
     if photons_traced(&scene.frame) {
         scene.photons_per_ray = photons_per_ray(scene, eye_moments(blocks, &measured));
     }
+    let highlights = if scene.frame.photon_sphere_count > 0 {
+        highlights::highlights(scene, blocks)
+    } else {
+        vec![0.0; blocks.count()]
+    };
     scene.frame = frame;
-    measured
+    (measured, highlights)
 }
 
 /// What a sample in every pixel does.

@@ -29,6 +29,12 @@ fn bands(errors: &[f32], costs: &[f32]) -> (Blocks, Vec<BlockMoments>) {
     (blocks, moments)
 }
 
+/// Of equal importance everywhere, without highlights.
+fn allocate_evenly(blocks: &Blocks, moments: &[BlockMoments], importance: f32) -> Vec<Rates> {
+    let everywhere = |value| vec![value; blocks.count()];
+    allocate(blocks, moments, &everywhere(importance), &everywhere(0.0))
+}
+
 /// The rate in the middle of each band.
 fn middles(rates: &[Rates], bands: usize) -> Vec<f32> {
     let columns = COLUMNS_PER_BAND * bands;
@@ -42,7 +48,7 @@ fn middles(rates: &[Rates], bands: usize) -> Vec<f32> {
 #[test]
 fn rates_follow_the_root_of_error_over_cost() {
     let (blocks, moments) = bands(&[1.0, 0.04, 0.16], &[4.0, 4.0, 16.0]);
-    let rates = allocate(&blocks, &moments, &vec![0.0; blocks.count()]);
+    let rates = allocate_evenly(&blocks, &moments, 0.0);
     let [a, b, c] = middles(&rates, 3)[..] else {
         panic!("three bands")
     };
@@ -50,7 +56,7 @@ fn rates_follow_the_root_of_error_over_cost() {
     assert!((a / c - 5.0).abs() < 0.05, "{a} {c}");
     // Control: equal errors at equal costs are equal.
     let (blocks, moments) = bands(&[0.3, 0.3], &[4.0, 4.0]);
-    let rates = allocate(&blocks, &moments, &vec![0.0; blocks.count()]);
+    let rates = allocate_evenly(&blocks, &moments, 0.0);
     let [a, b] = middles(&rates, 2)[..] else {
         panic!("two bands")
     };
@@ -61,12 +67,12 @@ fn rates_follow_the_root_of_error_over_cost() {
 #[test]
 fn no_more_samples_than_asked_for() {
     let (blocks, moments) = bands(&[0.3], &[4.0]);
-    let rates = allocate(&blocks, &moments, &vec![0.0; blocks.count()]);
+    let rates = allocate_evenly(&blocks, &moments, 0.0);
     for rate in &rates {
         assert!((rate.difference - 1.0).abs() < 2e-3, "{rate:?}");
     }
     let (blocks, moments) = bands(&[1.0, 1e-3, 1e-3, 1e-3], &[4.0; 4]);
-    let rates = allocate(&blocks, &moments, &vec![0.0; blocks.count()]);
+    let rates = allocate_evenly(&blocks, &moments, 0.0);
     let mean = rates.iter().map(|r| r.difference).sum::<f32>() / rates.len() as f32;
     assert!(mean < 0.8, "uneven errors save work: {mean}");
 }
@@ -75,7 +81,7 @@ fn no_more_samples_than_asked_for() {
 fn the_error_aimed_at_is_met_at_less_cost_than_evenly() {
     let errors = [1.0, 0.01];
     let (blocks, moments) = bands(&errors, &[4.0, 4.0]);
-    let rates = allocate(&blocks, &moments, &vec![0.0; blocks.count()]);
+    let rates = allocate_evenly(&blocks, &moments, 0.0);
     let predicted: f32 = moments
         .iter()
         .zip(&rates)
@@ -90,9 +96,8 @@ fn the_error_aimed_at_is_met_at_less_cost_than_evenly() {
 #[test]
 fn what_geometry_warns_of_is_sampled_though_nothing_was_measured() {
     let (blocks, moments) = bands(&[1.0, 0.0], &[4.0, 4.0]);
-    let importance = vec![1.0; blocks.count()];
-    let warned = middles(&allocate(&blocks, &moments, &importance), 2);
-    let silent = middles(&allocate(&blocks, &moments, &vec![0.0; blocks.count()]), 2);
+    let warned = middles(&allocate_evenly(&blocks, &moments, 1.0), 2);
+    let silent = middles(&allocate_evenly(&blocks, &moments, 0.0), 2);
     assert!(warned[1] >= 0.25, "{warned:?}");
     assert!(silent[1] < 0.2, "control: {silent:?}");
     assert!(
@@ -121,4 +126,32 @@ fn a_pixels_plan_is_its_rate() {
         mixed: 1.0,
     };
     assert_eq!(bright.pixel(0), expect(1, 4, 0));
+}
+
+/// Where a highlight was seen its pixels get more samples; nothing else changes.
+#[test]
+fn highlights_raise_the_rate_where_they_are() {
+    let (blocks, mut moments) = bands(&[1.0, 0.1], &[4.0, 4.0]);
+    for m in &mut moments {
+        m.mixed = Moments {
+            pixels: 1.0,
+            error: 0.01,
+            cost: 4.0,
+        };
+        m.near_share = 1.0;
+    }
+    let nowhere = vec![0.0; blocks.count()];
+    let mut somewhere = nowhere.clone();
+    let lit = ROWS / 2 * 2 * COLUMNS_PER_BAND + COLUMNS_PER_BAND / 2;
+    somewhere[lit] = 100.0;
+    let without = allocate(&blocks, &moments, &nowhere, &nowhere);
+    let with = allocate(&blocks, &moments, &nowhere, &somewhere);
+    for block in 0..blocks.count() {
+        if block == lit {
+            assert!(with[block].mixed > 4.0 * without[block].mixed);
+            assert_eq!(with[block].difference, without[block].difference);
+        } else {
+            assert_eq!(with[block], without[block]);
+        }
+    }
 }
