@@ -27,7 +27,7 @@ shared! {
     /// Radians from the axis up to which a fisheye has ideal points: 89 degrees.
     const FARTHEST_ANGLE: f32 = 1.553_343;
     /// Radians from the axis that the rays of a fisheye without an aperture reach at most.
-    const WIDEST_ANGLE: f32 = 3.141;
+    const WIDEST_ANGLE: f32 = 3.13;
     /// Nearer to the centre a fisheye is a pinhole.
     const CENTRE: f32 = 1e-7;
 }

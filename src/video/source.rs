@@ -4,8 +4,9 @@ use std::io::{BufReader, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use super::matrix::Matrix;
 use super::y4m::{Header, Planes, Y4mReader};
-use super::yuv::{Matrix, decode_yuv};
+use super::yuv::decode_yuv;
 use super::{Place, VideoError};
 use crate::decode::{MAX_PICTURE_BYTES, read_file, read_stream, split_jpegs};
 use crate::files;

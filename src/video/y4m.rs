@@ -4,7 +4,7 @@
 
 use std::io::Read;
 
-use super::yuv::Matrix;
+use super::matrix::Matrix;
 use super::{Place, VideoError};
 use crate::decode::{check_size, ensure_memory};
 use crate::refusal::Refusal;

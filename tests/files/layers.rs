@@ -1,7 +1,7 @@
 //! Which layers an EXR file has, and what they cost.
 
 use super::support::ball;
-use crate::support::Folder;
+use crate::support::{Folder, stderr};
 
 /// A small ball before a wide floor that it hardly touches.
 fn folder() -> Folder {
@@ -76,8 +76,7 @@ fn exr_layers() {
             .0
             .contains(&"real".to_owned())
     );
-    folder.refuse(
-        "render scene.toml -o out.exr --layers beauty",
-        "expected composite, difference",
-    );
+    let refused = folder.run("render scene.toml -o out.exr --layers beauty");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("expected composite, difference"));
 }

@@ -18,6 +18,7 @@ mod material;
 mod mesh;
 mod nodes;
 mod notes;
+mod slots;
 mod specular_glossiness;
 mod uv_sets;
 
@@ -34,6 +35,7 @@ use super::sandbox::Sandbox;
 use container::malformed;
 use deformable::read_skin;
 use document::Document;
+use instancing::copies;
 use lights::place_light;
 pub use lights::{PlacedLight, PunctualLight};
 use nodes::Node;
@@ -223,7 +225,7 @@ fn load(
             _ => None,
         };
         let copies = match &node.extensions.instancing {
-            Some(instancing) if skin.is_none() => instancing.copies(&document, &at)?,
+            Some(instancing) if skin.is_none() => copies(instancing, &document, &at)?,
             _ => vec![DMat4::IDENTITY],
         };
         for drawn in &drawn {

@@ -2,8 +2,6 @@
 
 use serde::Deserialize;
 
-use super::instancing::Instancing;
-
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Node {
@@ -57,4 +55,19 @@ pub(super) struct NodeLight {
 pub(super) struct SceneNodes {
     #[serde(default)]
     pub nodes: Vec<usize>,
+}
+
+/// EXT_mesh_gpu_instancing: accessors of the copies' places.
+#[derive(Deserialize)]
+pub(super) struct Instancing {
+    #[serde(default)]
+    pub attributes: Attributes,
+}
+
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub(super) struct Attributes {
+    pub translation: Option<usize>,
+    pub rotation: Option<usize>,
+    pub scale: Option<usize>,
 }

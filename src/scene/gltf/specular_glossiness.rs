@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use super::Problem;
 use super::container::malformed;
-use super::material::Slots;
+use super::slots::Slots;
 use crate::scene::{Material, Texture, TextureRef};
 
 pub(super) const NAME: &str = "KHR_materials_pbrSpecularGlossiness";

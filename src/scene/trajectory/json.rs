@@ -7,15 +7,14 @@ use glam::DMat4;
 use serde_json::{Map, Value};
 
 use super::json_intrinsics::{Style, style_of};
-use super::{Entry, EntryKey, Result, Trajectory, file_error, finite, name_of, pose_of_rows};
+use super::json_values::{Problem, number};
+use super::{Entry, EntryKey, Result, Trajectory, file_error, name_of, pose_of_rows};
 
 const POSE_KEYS: &[&str] = &[
     "world_from_camera",
     "transform_matrix",
     "camera_to_world_gltf",
 ];
-
-pub(super) type Problem<T> = std::result::Result<T, String>;
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Trajectory> {
     let document: Value =
@@ -155,13 +154,4 @@ fn read_pose(pose: &Value) -> Problem<Option<DMat4>> {
         }
     }
     pose_of_rows(matrix).map(Some)
-}
-
-pub(super) fn number(value: &Value, what: &str) -> Problem<f64> {
-    match value.as_f64() {
-        Some(x) => finite(x, what),
-        None => Err(format!(
-            "{what} is {value}; expected a finite number; correct it"
-        )),
-    }
 }

@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::Intrinsics;
 use super::intrinsics::{COEFFICIENTS, Fields, LensModel, Names};
-use super::json::{Problem, number};
+use super::json_values::{Problem, number};
 
 type Object = Map<String, Value>;
 
@@ -132,7 +132,7 @@ fn model_of(table: &Object) -> Problem<Option<LensModel>> {
         let value = table.get(*key);
         value.and_then(Value::as_bool) == Some(true) || value.and_then(Value::as_f64) == Some(1.0)
     };
-    if FISHEYE_KEYS.iter().any(|key| is_fisheye(key)) {
+    if FISHEYE_KEYS.iter().any(is_fisheye) {
         return Ok(Some(LensModel::Fisheye));
     }
     let nested = table

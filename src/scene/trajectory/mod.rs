@@ -9,6 +9,7 @@ mod frame_name;
 mod intrinsics;
 mod json;
 mod json_intrinsics;
+mod json_values;
 mod kitti;
 mod opencv;
 mod path;
