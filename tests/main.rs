@@ -5,6 +5,7 @@ mod backends;
 mod bench;
 mod cli;
 mod faults;
+mod files;
 mod gltf;
 mod gltf_pictures;
 mod interrupted;

@@ -107,6 +107,7 @@ fn scene_for(name: &str, reference: &Reference) -> Scene {
         height: height as u32,
         linear,
         encoded: EncodedPhoto::Linear,
+        tags: Default::default(),
     });
     let camera = &mut scene.camera;
     (camera.width, camera.height) = (width as u32, height as u32);

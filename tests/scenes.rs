@@ -30,7 +30,8 @@ fn render(scene: Scene) -> Renderer {
     let mut renderer = Renderer::new(
         scene,
         RendererOptions {
-            all_planes: true,
+            guides: true,
+            real_everywhere: true,
             ..RendererOptions::default()
         },
         &Watcher::none(),

@@ -9,7 +9,7 @@ use mixray::gpu::{Features, SceneBuffers, SceneParts};
 use mixray::math::*;
 use mixray::pack::camera::frame_camera;
 use mixray::packed::Frame;
-use mixray::scene::{Aperture, Camera, Lens};
+use mixray::scene::{Aperture, Camera, Distortion, Lens};
 
 /// Runs `body` on records of `N` words and gives `M` words for each; None, said aloud, without a device.
 fn on_gpu<const N: usize, const M: usize>(
@@ -235,7 +235,7 @@ fn bit_tests_and_hashes_agree() {
     }
 }
 
-fn frame(distortion: [f64; 5], aperture: Aperture, aperture_radius_m: f64) -> Frame {
+fn frame(distortion: Distortion, aperture: Aperture, aperture_radius_m: f64) -> Frame {
     let camera = Camera {
         width: 640,
         height: 480,
@@ -276,14 +276,23 @@ fn camera_rays_agree() {
             [v[0] * 640.0, v[1] * 480.0, v[2], v[3]].map(f32::to_bits)
         })
         .collect();
-    let none = [0.0; 5];
-    let barrel = [-0.28, 0.09, 0.0005, -0.0003, -0.01];
+    let none = Distortion::NONE;
+    let barrel = Distortion::opencv(&[-0.28, 0.09, 0.0005, -0.0003, -0.01]).unwrap();
+    let rational = Distortion::opencv(&[
+        0.2, -0.05, 0.001, -0.0015, 0.002, 0.35, 0.02, 0.001, 0.0012, -0.0008, 0.0006, 0.0004,
+    ]);
+    let rational = rational.unwrap();
+    let fisheye = Distortion::fisheye([0.05, -0.02, 0.004, -0.0005]);
     for (distortion, aperture, radius) in [
         (none, Aperture::Disc, 0.0),
         (none, Aperture::Disc, 0.05),
         (barrel, Aperture::Disc, 0.0),
         (barrel, Aperture::Square, 0.05),
         (none, Aperture::Blades(5), 0.05),
+        (rational, Aperture::Disc, 0.0),
+        (rational, Aperture::Disc, 0.05),
+        (fisheye, Aperture::Disc, 0.0),
+        (fisheye, Aperture::Disc, 0.05),
     ] {
         let frame = frame(distortion, aperture, radius);
         let Some(found) = on_gpu::<4, 12>(prelude, body, Some(frame), &inputs) else {

@@ -194,6 +194,7 @@ fn object(thing: Thing) -> Object {
         world_from_object: DMat4::IDENTITY,
         instances: vec![Instance {
             animation: None,
+            deformation: None,
             object_from_local: DMat4::IDENTITY,
             primitive: Arc::new(thing.mesh.to_primitive(thing.name)),
             material: Arc::new(thing.material),

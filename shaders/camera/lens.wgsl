@@ -5,6 +5,8 @@ import package::packed::records::{APERTURE_DISC, APERTURE_SQUARE};
 import package::math::{INV_TAU, dot3, normalize3, sincos_2pi};
 import package::camera::shutter::{CameraPose, camera_pose};
 import package::distortion::{distort, distortion_area, undistort_fast};
+@if(lens_models) import package::distortion::{LENS_FISHEYE, fisheye_angle_fast, fisheye_direction, fisheye_radius};
+@if(lens_models) import package::math::atan2_;
 
 fn sample_lens(u: f32, v: f32) -> vec2<f32> {
     let radius = frame.aperture_radius;
@@ -48,6 +50,13 @@ fn camera_ray(px: f32, py: f32, lens_u: f32, lens_v: f32) -> CameraRay {
 }
 
 fn camera_ray_from(pose: CameraPose, px: f32, py: f32, lens_u: f32, lens_v: f32) -> CameraRay {
+    @if(lens_models) {
+        if is_wide() {
+            let distorted = vec2<f32>((px - frame.intrinsics.z) / frame.intrinsics.x, (py - frame.intrinsics.w) / frame.intrinsics.y);
+            let d = fisheye_direction(coefficients(), distorted);
+            return CameraRay(pose.position, normalize3(pose.right * d.x - (pose.up * d.y + pose.back * d.z)));
+        }
+    }
     let ideal = lens_undistort(
         (px - frame.intrinsics.z) / frame.intrinsics.x,
         (py - frame.intrinsics.w) / frame.intrinsics.y,
@@ -64,6 +73,9 @@ fn camera_ray_from(pose: CameraPose, px: f32, py: f32, lens_u: f32, lens_v: f32)
 }
 
 fn camera_project(position: vec3<f32>) -> Projection {
+    @if(lens_models) {
+        if is_wide() { return project_wide(position); }
+    }
     let v = position - frame.camera_position.xyz;
     let depth = -dot3(v, frame.camera_back.xyz);
     if depth <= 0.0 {
@@ -80,19 +92,47 @@ fn camera_project(position: vec3<f32>) -> Projection {
     return Projection(px, py, depth, inside && miss <= 1e-3 * (1.0 + abs(x) + abs(y)));
 }
 
+@if(lens_models)
+fn project_wide(position: vec3<f32>) -> Projection {
+    let v = position - frame.camera_position.xyz;
+    let depth = -dot3(v, frame.camera_back.xyz);
+    let x = dot3(v, frame.camera_right.xyz);
+    let y = -dot3(v, frame.camera_up.xyz);
+    let k = coefficients();
+    let r = sqrt(x * x + y * y);
+    let angle = atan2_(r, depth);
+    let radius = fisheye_radius(k, angle);
+    var scale = 0.0;
+    if r > 0.0 { scale = radius / r; }
+    let px = x * scale * frame.intrinsics.x + frame.intrinsics.z;
+    let py = y * scale * frame.intrinsics.y + frame.intrinsics.w;
+    let inside = px >= 0.0 && py >= 0.0 && px < f32(frame.width) && py < f32(frame.height);
+    let miss = abs(fisheye_angle_fast(k, radius) - angle);
+    return Projection(px, py, depth, inside && miss <= 1e-3 && (r > 0.0 || depth > 0.0));
+}
+
 fn lens_distort(x: f32, y: f32) -> vec2<f32> {
-    return distort(coefficients(), vec2<f32>(x, y));
+    return distort(frame.lens_model, coefficients(), vec2<f32>(x, y));
 }
 
 fn lens_undistort(xd: f32, yd: f32) -> vec2<f32> {
-    return undistort_fast(coefficients(), vec2<f32>(xd, yd));
+    return undistort_fast(frame.lens_model, coefficients(), vec2<f32>(xd, yd));
 }
 
 fn lens_area(x: f32, y: f32) -> f32 {
-    return distortion_area(coefficients(), vec2<f32>(x, y));
+    return distortion_area(frame.lens_model, coefficients(), vec2<f32>(x, y));
 }
 
-fn coefficients() -> array<f32, 5> {
+@if(lens_models)
+fn is_wide() -> bool {
+    return frame.lens_model == LENS_FISHEYE && frame.aperture_radius == 0.0;
+}
+
+fn coefficients() -> array<f32, 12> {
     let k = frame.distortion;
-    return array<f32, 5>(k.x, k.y, k.z, k.w, frame.distortion_k3);
+    let more = frame.distortion_more;
+    return array<f32, 12>(
+        k.x, k.y, k.z, k.w, frame.distortion_k3,
+        more[0].x, more[0].y, more[0].z, more[0].w, more[1].x, more[1].y, more[1].z,
+    );
 }

@@ -43,6 +43,7 @@ pub(super) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -
             multiple_scattering: false,
             exposure: Exposure::Ev(0.0),
             backdrop: Backdrop::Environment,
+            upright_photo: false,
         },
         warnings: Vec::new(),
     }
@@ -66,7 +67,7 @@ pub(super) fn camera(
         fy: focal_px,
         cx: f64::from(width) * 0.5,
         cy: f64::from(height) * 0.5,
-        distortion: [0.0; 5],
+        distortion: crate::scene::Distortion::NONE,
         world_from_camera: DMat4::from_cols(
             axis(right, 0.0),
             axis(back.cross(right), 0.0),
@@ -90,6 +91,7 @@ pub(super) fn object(
         world_from_object,
         instances: vec![Instance {
             animation: None,
+            deformation: None,
             object_from_local: DMat4::IDENTITY,
             primitive: Arc::new(primitive),
             material: Arc::new(material),

@@ -6,8 +6,11 @@
 use glam::Vec3;
 
 use super::shutter::{CameraPose, camera_pose};
-use crate::distortion::{Coefficients, distort, distortion_area, undistort_fast};
-use crate::math::{INV_TAU, dot3, normalize3, sincos_2pi};
+use crate::distortion::{
+    Coefficients, LENS_FISHEYE, distort, distortion_area, fisheye_angle_fast, fisheye_direction,
+    fisheye_radius, undistort_fast,
+};
+use crate::math::{INV_TAU, atan2_, dot3, normalize3, sincos_2pi};
 use crate::packed::{APERTURE_DISC, APERTURE_SQUARE, Frame};
 use crate::shared::shared;
 
@@ -85,6 +88,13 @@ pub fn camera_ray_from(
     lens_v: f32,
 ) -> CameraRay {
     let [fx, fy, cx, cy] = frame.intrinsics;
+    if is_wide(frame) {
+        let d = fisheye_direction(&coefficients(frame), [(px - cx) / fx, (py - cy) / fy]);
+        return CameraRay {
+            origin: pose.position,
+            direction: normalize3(pose.right * d[0] - (pose.up * d[1] + pose.back * d[2])),
+        };
+    }
     let ideal = lens_undistort(frame, (px - cx) / fx, (py - cy) / fy);
     // At depth 1 along the view axis; pixel y runs down. Grouped: a shader compiler regroups a - b - c as it likes.
     let d = pose.right * ideal[0] - (pose.up * ideal[1] + pose.back);
@@ -104,6 +114,9 @@ pub fn camera_ray_from(
 
 /// Where the pinhole at the lens centre sees an anchor-relative point.
 pub fn camera_project(frame: &Frame, position: Vec3) -> Projection {
+    if is_wide(frame) {
+        return project_wide(frame, position);
+    }
     let [fx, fy, cx, cy] = frame.intrinsics;
     let v = position - xyz(frame.camera_position);
     let depth = -dot3(v, xyz(frame.camera_back));
@@ -132,29 +145,77 @@ pub fn camera_project(frame: &Frame, position: Vec3) -> Projection {
     }
 }
 
+/// [`camera_project`] of a fisheye without an aperture, which sees what is behind it too.
+fn project_wide(frame: &Frame, position: Vec3) -> Projection {
+    let [fx, fy, cx, cy] = frame.intrinsics;
+    let v = position - xyz(frame.camera_position);
+    let depth = -dot3(v, xyz(frame.camera_back));
+    let x = dot3(v, xyz(frame.camera_right));
+    let y = -dot3(v, xyz(frame.camera_up));
+    let k = coefficients(frame);
+    let r = (x * x + y * y).sqrt();
+    let angle = atan2_(r, depth);
+    let radius = fisheye_radius(&k, angle);
+    let mut scale = 0.0;
+    if r > 0.0 {
+        scale = radius / r;
+    }
+    let px = x * scale * fx + cx;
+    let py = y * scale * fy + cy;
+    let inside = px >= 0.0 && py >= 0.0 && px < frame.width as f32 && py < frame.height as f32;
+    let miss = (fisheye_angle_fast(&k, radius) - angle).abs();
+    Projection {
+        px,
+        py,
+        depth,
+        valid: inside && miss <= 1e-3 && (r > 0.0 || depth > 0.0),
+    }
+}
+
 /// Distorted normalised coordinates (y down) of ideal ones.
 pub fn lens_distort(frame: &Frame, x: f32, y: f32) -> [f32; 2] {
-    distort(&coefficients(frame), [x, y])
+    distort(frame.lens_model, &coefficients(frame), [x, y])
 }
 
 /// Ideal normalised coordinates of distorted ones, by Newton's method; the argument itself where there is no distortion.
 pub fn lens_undistort(frame: &Frame, xd: f32, yd: f32) -> [f32; 2] {
-    undistort_fast(&coefficients(frame), [xd, yd])
+    undistort_fast(frame.lens_model, &coefficients(frame), [xd, yd])
 }
 
 /// How much larger a small area is in distorted normalised coordinates than in ideal ones.
 pub fn lens_area(frame: &Frame, x: f32, y: f32) -> f32 {
-    distortion_area(&coefficients(frame), [x, y])
+    distortion_area(frame.lens_model, &coefficients(frame), [x, y])
 }
 
-fn coefficients(frame: &Frame) -> Coefficients<f32> {
+/// Rays may look sideways and back.
+pub fn is_wide(frame: &Frame) -> bool {
+    frame.lens_model == LENS_FISHEYE && frame.aperture_radius == 0.0
+}
+
+pub fn coefficients(frame: &Frame) -> Coefficients<f32> {
     let [k1, k2, p1, p2] = frame.distortion;
-    [k1, k2, p1, p2, frame.distortion_k3]
+    let [[k4, k5, k6, s1], [s2, s3, s4, _]] = frame.distortion_more;
+    [
+        k1,
+        k2,
+        p1,
+        p2,
+        frame.distortion_k3,
+        k4,
+        k5,
+        k6,
+        s1,
+        s2,
+        s3,
+        s4,
+    ]
 }
 
 fn xyz(v: [f32; 4]) -> Vec3 {
     Vec3::new(v[0], v[1], v[2])
 }
 
+#[cfg(test)]
+mod model_tests;
 #[cfg(test)]
 mod tests;

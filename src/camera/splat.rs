@@ -5,9 +5,10 @@
 
 use glam::Vec3;
 
-use super::lens::{lens_area, lens_distort, lens_undistort, sample_lens};
+use super::lens::{coefficients, is_wide, lens_area, lens_distort, lens_undistort, sample_lens};
 use super::shutter::CameraPose;
-use crate::math::{dot3, length3};
+use crate::distortion::{fisheye_angle_fast, fisheye_radius, fisheye_slope};
+use crate::math::{atan2_, dot3, length3};
 use crate::packed::{Frame, NONE};
 use crate::shared::shared;
 
@@ -50,6 +51,9 @@ pub fn lens_connect(
         distance,
         importance: 0.0,
     };
+    if is_wide(frame) {
+        return connect_wide(frame, pose, to_lens, distance);
+    }
     if depth <= 0.0 {
         return connection;
     }
@@ -71,6 +75,39 @@ pub fn lens_connect(
     // Pixels per solid angle at the lens point: cos^3 of the angle to the axis turns solid angle into area at depth 1.
     let secant = distance / depth;
     connection.importance = fx * fy * lens_area(frame, x, y) * (secant * secant * secant);
+    connection
+}
+
+/// [`lens_connect`] to a fisheye without an aperture.
+fn connect_wide(frame: &Frame, pose: &CameraPose, to_lens: Vec3, distance: f32) -> LensConnection {
+    let x = -dot3(to_lens, pose.right);
+    let y = dot3(to_lens, pose.up);
+    let k = coefficients(frame);
+    let r = (x * x + y * y).sqrt();
+    let angle = atan2_(r, dot3(to_lens, pose.back));
+    let radius = fisheye_radius(&k, angle);
+    let mut scale = 0.0;
+    // Area of the photograph per solid angle.
+    let mut density = 1.0;
+    if r > 1e-6 * distance {
+        scale = radius / r;
+        density = scale * fisheye_slope(&k, angle) * distance;
+    }
+    let [fx, fy, cx, cy] = frame.intrinsics;
+    let px = x * scale * fx + cx;
+    let py = y * scale * fy + cy;
+    let inside = px >= 0.0 && py >= 0.0 && px < frame.width as f32 && py < frame.height as f32;
+    let miss = (fisheye_angle_fast(&k, radius) - angle).abs();
+    let mut connection = LensConnection {
+        pixel: NONE,
+        direction: to_lens / distance,
+        distance,
+        importance: 0.0,
+    };
+    if inside && miss <= FOLD_TOLERANCE {
+        connection.pixel = py as u32 * frame.width + px as u32;
+        connection.importance = fx * fy * density;
+    }
     connection
 }
 

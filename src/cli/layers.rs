@@ -7,7 +7,7 @@ use clap::Args;
 use super::{Failure, read_photo};
 use crate::film::Picture;
 use crate::output::{ChannelFile, PngBits};
-use crate::scene::{EncodedPhoto, Photo};
+use crate::scene::{Photo, read_coverage};
 
 #[derive(Debug, Args)]
 pub(super) struct LayerArguments {
@@ -15,7 +15,7 @@ pub(super) struct LayerArguments {
     photo: PathBuf,
     /// The virtual things, not premultiplied, of the photograph's size; pixels outside the mask are not read
     layer: PathBuf,
-    /// Grey picture: how much of each pixel is virtual, black 0, white 1; of an EXR file the channel mask.Y, A, Y or R
+    /// Grey picture: how much of each pixel is virtual, black 0, white 1; its alpha where it has one; of an EXR file the channel mask.Y, A, Y or R
     mask: PathBuf,
     /// MASK is a depth picture: what is nearer than the far limit is virtual; of an EXR file the channel depth.Z, Depth.Z, Z, Y or R
     #[arg(long)]
@@ -96,17 +96,11 @@ impl LayerArguments {
         {
             return self.read_channel();
         }
-        let mask = read_photo(&self.mask)?;
-        let values = match &mask.encoded {
-            EncodedPhoto::Srgb8(codes) => codes.iter().map(|c| f32::from(c[0]) / 255.0).collect(),
-            EncodedPhoto::Srgb16(codes) => {
-                codes.iter().map(|c| f32::from(c[0]) / 65535.0).collect()
-            }
-            EncodedPhoto::Linear => mask.linear.iter().map(|value| value[0]).collect(),
-        };
+        let (width, height, values) = read_coverage(&self.mask)
+            .map_err(|problem| Failure(format!("{}: {problem}", self.mask.display())))?;
         Ok(Plane {
-            width: mask.width,
-            height: mask.height,
+            width,
+            height,
             values,
         })
     }

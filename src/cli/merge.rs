@@ -11,7 +11,7 @@ use super::summary::combination;
 use super::values::png_bits;
 use super::{Failure, Outcome, print, say};
 use crate::film::Film;
-use crate::output::{FilmNote, PngBits, Target, read_film};
+use crate::output::{ExrLayers, FilmNote, PngBits, Target, read_film};
 use crate::renderer::{Progress, Renderer, Watcher};
 use crate::scene::sandbox::Sandbox;
 use crate::scene::{BackendChoice, Scene};
@@ -86,6 +86,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let moved = write(
         &renderer,
         &targets,
+        &ExrLayers::all(),
         arguments.png_bits,
         arguments.frame,
         (!complete).then_some(range),

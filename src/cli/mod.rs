@@ -80,8 +80,20 @@ impl<E: std::error::Error> From<E> for Failure {
 
 /// Parses the process's arguments and runs the command.
 pub fn run() -> ExitCode {
+    quiet_device_selection();
     pool::on_large_stack(run_command)
 }
+
+/// Mesa's layer that orders devices asks the desktop, and complains on the terminal where there is none.
+fn quiet_device_selection() {
+    let is_set = |name: &str| std::env::var_os(name).is_some();
+    if !is_set("XDG_RUNTIME_DIR") && !is_set(MESA_NO_DEVICE_SELECTION) {
+        // SAFETY: no other thread runs yet.
+        unsafe { std::env::set_var(MESA_NO_DEVICE_SELECTION, "1") };
+    }
+}
+
+const MESA_NO_DEVICE_SELECTION: &str = "NODEVICE_SELECT";
 
 fn run_command() -> ExitCode {
     interrupt::survive_file_limits();

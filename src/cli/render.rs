@@ -10,8 +10,8 @@ use super::progress::Bar;
 use super::values::whole_range;
 use super::{Failure, Outcome, interrupt, print, say, summary};
 use crate::output::{
-    FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr, write_film, write_png,
-    write_text,
+    ExrLayer, ExrLayers, FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr,
+    write_film, write_png, write_text,
 };
 use crate::renderer::{
     Budget, Delivered, Goal, Progress, Renderer, RendererOptions, Stats, Watcher,
@@ -26,9 +26,19 @@ use crate::stages::{GpuStages, finish};
 pub(super) struct Arguments {
     /// Scene file (TOML)
     scene: PathBuf,
-    /// Picture to write, .png or .exr with all planes; may be given several times [default: the scene's folder name + .png]
+    /// Picture to write, .png or .exr; may be given several times [default: the scene's folder name + .png]
     #[arg(short, long, value_name = "OUT")]
     output: Vec<PathBuf>,
+    /// Layers of .exr pictures, with commas between: composite, difference, mask, depth, normal, albedo, variance, samples, real, mixed.
+    /// real and mixed ask for the real light everywhere, which may cost several times the rest [default: composite, difference, mask,
+    /// depth, normal, variance, samples; with the quotient composite real too; with --range all]
+    #[arg(
+        long,
+        value_name = "NAME,...",
+        value_delimiter = ',',
+        conflicts_with = "range"
+    )]
+    layers: Vec<ExrLayer>,
     #[command(flatten)]
     flags: PictureFlags,
     /// Render only these of each pixel's rays, FROM to TO - 1, into an .exr that `mixray merge` puts together with the others
@@ -50,6 +60,7 @@ pub(super) struct Job {
     frame: u32,
     range: Option<(u32, u32)>,
     goal: Option<Goal>,
+    layers: Vec<ExrLayer>,
 }
 
 impl Arguments {
@@ -75,6 +86,7 @@ impl Arguments {
         let goal = self.flags.goal.goal(self.flags.rpp)?;
         Ok(Job {
             goal,
+            layers: self.layers,
             scene: self.scene,
             targets,
             overrides: Overrides {
@@ -114,8 +126,15 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     };
     let load_secs = start.elapsed().as_secs_f64();
 
+    let is_exr = targets.iter().any(|t| t.format() == Format::Exr);
+    // A film that goes on has everything that it may be asked for.
+    let layers = match job.range {
+        Some(_) => ExrLayers::all(),
+        None => ExrLayers::new(&job.layers, scene.settings.composite),
+    };
     let options = RendererOptions {
-        all_planes: targets.iter().any(|t| t.format() == Format::Exr),
+        guides: is_exr && layers.need_guides(),
+        real_everywhere: is_exr && layers.need_real_everywhere(),
         sample_range: job.range,
         without: job.flags.without(),
         filter: job.flags.goal.filter,
@@ -142,11 +161,18 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         say("note", note);
     }
     warn_of_non_finite(&renderer);
+    if !shows_virtual(&renderer) {
+        say(
+            "note",
+            "nothing virtual is seen: no ray of the camera meets a virtual object first; look at the objects' places and scales and at the camera",
+        );
+    }
 
     let start = Instant::now();
     let moved = write(
         &renderer,
         &targets,
+        &layers,
         job.flags.png_bits,
         job.frame,
         job.range.map(|_| {
@@ -175,6 +201,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
 pub(super) fn write(
     renderer: &Renderer,
     targets: &[Target],
+    layers: &ExrLayers,
     png_bits: Option<PngBits>,
     frame: u32,
     film_range: Option<(u32, u32)>,
@@ -218,6 +245,8 @@ pub(super) fn write(
                     let note = FilmNote::new(renderer.scene(), range, without);
                     write_film(target, &picture, &planes, &metadata, film, &note)?;
                 } else {
+                    let (mut picture, mut planes) = (picture.clone(), planes);
+                    layers.pick(&mut picture, &mut planes);
                     write_exr(target, &picture, &planes, &metadata)?;
                 }
             }
@@ -232,6 +261,10 @@ pub(super) fn say_idle(saving: &str, reason: &str) {
         "note",
         &format!("--no-skip {saving} changes nothing here: {reason}"),
     );
+}
+
+fn shows_virtual(renderer: &Renderer) -> bool {
+    renderer.film().pixels.iter().any(|pixel| pixel.m > 0)
 }
 
 /// Says which sample to render again to see the first of them.

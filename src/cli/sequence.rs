@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::picture_flags::PictureFlags;
 use super::progress::Steps;
@@ -15,6 +15,7 @@ use crate::renderer::Watcher;
 use crate::scene::Overrides;
 use crate::scene::trajectory::FORMATS;
 use crate::sequence::{Event, RenderedSequence, SequenceOptions, check_poses, render_sequence};
+use crate::video::Matrix;
 
 /// Renders a scene's virtual objects into the frames of a video
 ///
@@ -40,6 +41,12 @@ pub(super) struct Arguments {
     /// Numbers may be missing among the frames of a folder
     #[arg(long)]
     allow_gaps: bool,
+    /// Frames of which a part is lost: end with an error, or name them and let what is there of them pass
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = Damaged::Refuse)]
+    damaged_frames: Damaged,
+    /// Y'CbCr of films [default: 709 from 720 lines on, else 601]
+    #[arg(long, value_name = "MATRIX", value_parser = matrix)]
+    matrix: Option<Matrix>,
     /// Frames a second, where neither the frames nor the trajectory tell
     #[arg(long, value_name = "RATE", value_parser = positive)]
     fps: Option<f64>,
@@ -57,6 +64,12 @@ pub(super) struct Arguments {
     max_error: f64,
     #[command(flatten)]
     flags: PictureFlags,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Damaged {
+    Refuse,
+    Pass,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
@@ -86,6 +99,8 @@ impl Arguments {
             output: self.output.clone().unwrap_or_else(|| "-".into()),
             range: self.range,
             allow_gaps: self.allow_gaps,
+            pass_damaged_frames: self.damaged_frames == Damaged::Pass,
+            matrix: self.matrix,
             frames_per_second: self.fps,
             focus_pull_m: self.focus_pull,
             overwrite: self.overwrite,
@@ -150,6 +165,14 @@ fn tell(event: &Event<'_>) {
         Event::Note(text) => say("note", text),
         Event::Idle { saving, reason } => say_idle(saving, reason),
         Event::Plan { .. } | Event::Begins { .. } | Event::Ends { .. } => {}
+    }
+}
+
+fn matrix(text: &str) -> Result<Matrix, &'static str> {
+    match text {
+        "601" => Ok(Matrix::Bt601),
+        "709" => Ok(Matrix::Bt709),
+        _ => Err("expected 601 or 709"),
     }
 }
 

@@ -2,12 +2,15 @@
 
 use std::borrow::Cow;
 use std::io::Cursor;
+use std::sync::Arc;
 
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::jpeg::{MAX_SCANS, outline, with_standard_tables};
-use super::{ImageFile, Pixels, Rgba8, broken, check_size, ensure_memory};
+use super::png::colour_chunks;
+use super::profile::{ColourProfile, Unused};
+use super::{ALPHA, ImageFile, Pixels, Rgba8, Tags, broken, check_size, ensure_memory};
 
 /// Of a decoded pixel in linear light, which a photograph keeps beside its codes.
 const LINEAR_BYTES: u64 = 12;
@@ -15,16 +18,24 @@ const LINEAR_BYTES: u64 = 12;
 const COEFFICIENT_BYTES: u64 = 8;
 
 pub(super) fn read_png(bytes: &[u8]) -> Result<ImageFile, String> {
-    let mut image = read_codes(bytes, ImageFormat::Png)?;
-    if !image.warnings.iter().any(|w| w == PROFILE) && has_gamma_without_srgb(bytes) {
-        let warning = "its gamma chunk is ignored: it is read as sRGB".to_owned();
+    let chunks = colour_chunks(bytes);
+    let mut image = read_codes(bytes, ImageFormat::Png, chunks.cicp)?;
+    let is_told = image.tags.profile.is_some() || image.warnings.iter().any(|w| w == PROFILE);
+    if chunks.has_other_colours && chunks.cicp.is_none() && !is_told {
+        let warning = "its gamma and primaries are ignored: it is read as sRGB".to_owned();
         image.warnings.insert(0, warning);
     }
     Ok(image)
 }
 
 pub(super) fn read_jpeg(bytes: &[u8]) -> Result<ImageFile, String> {
-    read_codes(&checked_jpeg(bytes)?, ImageFormat::Jpeg)
+    read_codes(&checked_jpeg(bytes)?, ImageFormat::Jpeg, None)
+}
+
+/// What can be decoded of a JPEG picture that is cut off; the rest is grey.
+pub(super) fn read_cut_jpeg(bytes: &[u8]) -> Result<ImageFile, String> {
+    let whole = [bytes, &[0xff, 0xd9]].concat();
+    read_jpeg(&whole)
 }
 
 /// Refuses what a decoder would take long for or pass over in silence; brings the tables that a picture may leave out.
@@ -45,9 +56,14 @@ fn checked_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     })
 }
 
-const PROFILE: &str = "its colour profile is ignored: it is read as sRGB";
+const PROFILE: &str = "its colour profile is not understood: it is read as sRGB";
 
-fn read_codes(bytes: &[u8], format: ImageFormat) -> Result<ImageFile, String> {
+/// `cicp` wins over an ICC profile.
+fn read_codes(
+    bytes: &[u8],
+    format: ImageFormat,
+    cicp: Option<[u8; 4]>,
+) -> Result<ImageFile, String> {
     let (mut decoder, (width, height)) = open(bytes, format)?;
     let codes = match decoder.color_type().bytes_per_pixel() / decoder.color_type().channel_count()
     {
@@ -56,32 +72,38 @@ fn read_codes(bytes: &[u8], format: ImageFormat) -> Result<ImageFile, String> {
     };
     ensure_decoding(&decoder, (width, height), format, codes + LINEAR_BYTES)?;
     let mut warnings = Vec::new();
-    if matches!(decoder.icc_profile(), Ok(Some(_))) {
-        warnings.push(PROFILE.to_owned());
+    let mut tags = Tags::default();
+    let profile = match (cicp, decoder.icc_profile()) {
+        (Some(cicp), _) => Some(ColourProfile::of_cicp(cicp)),
+        (None, Ok(Some(icc))) => Some(ColourProfile::of_icc(icc)),
+        (None, _) => None,
+    };
+    match profile {
+        Some(Ok(profile)) => tags.profile = Some(Arc::new(profile)),
+        Some(Err(Unused::NotUnderstood)) => warnings.push(PROFILE.to_owned()),
+        Some(Err(Unused::IsSrgb)) | None => {}
     }
-    if !matches!(
-        decoder.orientation(),
-        Ok(Orientation::NoTransforms) | Err(_)
-    ) {
-        warnings.push("its orientation tag is ignored: the pixels are used as stored".to_owned());
-    }
+    tags.orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let decoded = DynamicImage::from_decoder(decoder).map_err(broken)?;
-    if has_transparency(&decoded) {
-        warnings.push("its alpha channel is ignored".to_owned());
+    let alpha = alpha_of(&decoded);
+    if !alpha.is_empty() {
+        warnings.push(ALPHA.to_owned());
     }
     let pixels = match decoded {
         DynamicImage::ImageLuma16(_)
         | DynamicImage::ImageLumaA16(_)
         | DynamicImage::ImageRgb16(_)
         | DynamicImage::ImageRgba16(_) => {
-            Pixels::Srgb16(in_threes(decoded.into_rgb16().into_raw()))
+            Pixels::Codes16(in_threes(decoded.into_rgb16().into_raw()))
         }
-        _ => Pixels::Srgb8(in_threes(decoded.into_rgb8().into_raw())),
+        _ => Pixels::Codes8(in_threes(decoded.into_rgb8().into_raw())),
     };
     Ok(ImageFile {
         width,
         height,
         pixels,
+        alpha,
+        tags,
         warnings,
     })
 }
@@ -137,30 +159,19 @@ pub(super) fn in_threes<T: bytemuck::Pod>(samples: Vec<T>) -> Vec<[T; 3]> {
         .unwrap_or_else(|(_, samples)| samples.as_chunks().0.to_vec())
 }
 
-fn has_transparency(image: &DynamicImage) -> bool {
-    match image {
-        DynamicImage::ImageLumaA8(image) => image.pixels().any(|p| p.0[1] != u8::MAX),
-        DynamicImage::ImageRgba8(image) => image.pixels().any(|p| p.0[3] != u8::MAX),
-        DynamicImage::ImageLumaA16(image) => image.pixels().any(|p| p.0[1] != u16::MAX),
-        DynamicImage::ImageRgba16(image) => image.pixels().any(|p| p.0[3] != u16::MAX),
-        _ => false,
+/// 0 to 1; empty where every pixel is opaque.
+fn alpha_of(image: &DynamicImage) -> Vec<f32> {
+    let eight = |code: u8| f32::from(code) / 255.0;
+    let sixteen = |code: u16| f32::from(code) / 65535.0;
+    let alpha: Vec<f32> = match image {
+        DynamicImage::ImageLumaA8(image) => image.pixels().map(|p| eight(p.0[1])).collect(),
+        DynamicImage::ImageRgba8(image) => image.pixels().map(|p| eight(p.0[3])).collect(),
+        DynamicImage::ImageLumaA16(image) => image.pixels().map(|p| sixteen(p.0[1])).collect(),
+        DynamicImage::ImageRgba16(image) => image.pixels().map(|p| sixteen(p.0[3])).collect(),
+        _ => return Vec::new(),
+    };
+    match alpha.iter().any(|a| *a != 1.0) {
+        true => alpha,
+        false => Vec::new(),
     }
-}
-
-/// A gAMA chunk beside an sRGB chunk is only the fallback that the PNG standard asks for.
-fn has_gamma_without_srgb(bytes: &[u8]) -> bool {
-    let (mut gamma, mut srgb) = (false, false);
-    let mut rest = bytes.get(8..).unwrap_or_default();
-    while let Some((header, tail)) = rest.split_first_chunk::<8>() {
-        let [a, b, c, d, name @ ..] = header;
-        match name {
-            b"gAMA" => gamma = true,
-            b"sRGB" => srgb = true,
-            b"IDAT" => break,
-            _ => {}
-        }
-        let length = u32::from_be_bytes([*a, *b, *c, *d]) as usize;
-        rest = tail.get(length.saturating_add(4)..).unwrap_or_default();
-    }
-    gamma && !srgb
 }

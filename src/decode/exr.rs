@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::channels::ChannelFile;
 use super::file::{MAX_PICTURE_BYTES, read_file};
-use super::{ImageFile, Pixels, broken, check_size, ensure_memory, guarded};
+use super::{ALPHA, ImageFile, Pixels, Tags, broken, check_size, ensure_memory, guarded};
 
 /// Most channels of a part.
 const MAX_CHANNELS: usize = 1024;
@@ -77,10 +77,13 @@ fn read_channels(bytes: &[u8]) -> Result<ChannelFile, String> {
     Ok(file)
 }
 
-/// The picture among the parts and layers of a file.
-pub(super) fn read_picture(bytes: &[u8]) -> Result<ImageFile, String> {
+/// The picture among the parts and layers of a file, or the one of this name.
+pub(super) fn read_picture(bytes: &[u8], layer: Option<&str>) -> Result<ImageFile, String> {
     let headers = read_headers(bytes)?;
-    let (part, rgb) = pick(&headers)?;
+    let (part, rgb) = match layer {
+        Some(layer) => pick_named(&headers, layer)?,
+        None => pick(&headers)?,
+    };
     let header = &headers[part];
     let window = header.shared_attributes.display_window;
     let (width, height) = check_size(window.size.x() as u64, window.size.y() as u64)?;
@@ -93,7 +96,7 @@ pub(super) fn read_picture(bytes: &[u8]) -> Result<ImageFile, String> {
         warnings.push("its chromaticities are ignored: it is read as linear Rec.709".to_owned());
     }
     if find(header, "A").is_some() {
-        warnings.push("its alpha channel is ignored".to_owned());
+        warnings.push(ALPHA.to_owned());
     }
     let mut wanted = rgb.to_vec();
     wanted.dedup();
@@ -122,6 +125,8 @@ pub(super) fn read_picture(bytes: &[u8]) -> Result<ImageFile, String> {
         width,
         height,
         pixels: Pixels::Linear(pixels),
+        alpha: Vec::new(),
+        tags: Tags::default(),
         warnings,
     })
 }
@@ -166,9 +171,12 @@ const PICTURE_NAMES: [&str; 7] = [
     "main",
 ];
 
-/// The part and the channels that are the picture: those without a layer's name; else of a layer that is named so; else the only ones.
-fn pick(headers: &[Header]) -> Result<(usize, [usize; 3]), String> {
-    let mut found: Vec<(String, usize, [usize; 3])> = Vec::new();
+/// A part and the channels of a picture.
+type Place = (usize, [usize; 3]);
+
+/// The pictures by their names: part and layer with a point between them, as far as they have any.
+fn pictures(headers: &[Header]) -> Vec<(String, Place)> {
+    let mut found = Vec::new();
     for (part, header) in headers.iter().enumerate() {
         let part_name = match (headers.len(), &header.own_attributes.layer_name) {
             (2.., Some(name)) => text_of(name),
@@ -186,10 +194,37 @@ fn pick(headers: &[Header]) -> Result<(usize, [usize; 3]), String> {
             if let [Some(r), Some(g), Some(b)] = rgb {
                 let names = [part_name.as_str(), layer.trim_end_matches('.')];
                 let whole = names.join(".").trim_matches('.').to_owned();
-                found.push((whole, part, [r, g, b]));
+                found.push((whole, (part, [r, g, b])));
             }
         }
     }
+    found
+}
+
+/// By its name, or the end of it after a point.
+fn pick_named(headers: &[Header], layer: &str) -> Result<Place, String> {
+    let found = pictures(headers);
+    let is_whole = |(name, _): &&(String, Place)| name == layer;
+    let ends = |(name, _): &&(String, Place)| {
+        name.strip_suffix(layer)
+            .is_some_and(|rest| rest.ends_with('.'))
+    };
+    let mut alike = found.iter().filter(ends);
+    match (found.iter().find(is_whole), alike.next(), alike.next()) {
+        (Some((_, place)), ..) | (None, Some((_, place)), None) => Ok(*place),
+        _ => {
+            let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+            Err(format!(
+                "it has no one picture \"{layer}\"; expected one of \"{}\"; correct the name after the #",
+                names.join("\", \"")
+            ))
+        }
+    }
+}
+
+/// The part and the channels that are the picture: those without a layer's name; else of a layer that is named so; else the only ones.
+fn pick(headers: &[Header]) -> Result<Place, String> {
+    let mut found = pictures(headers);
     let rank = |name: &str| {
         let last = name.rsplit('.').next().unwrap_or_default();
         match last.to_ascii_lowercase() {
@@ -198,16 +233,16 @@ fn pick(headers: &[Header]) -> Result<(usize, [usize; 3]), String> {
             _ => 2,
         }
     };
-    found.sort_by_key(|(name, part, _)| (rank(name), *part));
+    found.sort_by_key(|(name, (part, _))| (rank(name), *part));
     match found.as_slice() {
-        [(name, part, rgb), rest @ ..] if rank(name) < 2 || rest.is_empty() => Ok((*part, *rgb)),
+        [(name, place), rest @ ..] if rank(name) < 2 || rest.is_empty() => Ok(*place),
         [] => grey(headers).ok_or_else(|| {
             "it has no channels R, G, B or Y; expected an RGB or grey image; convert it".to_owned()
         }),
         several => {
             let names: Vec<&str> = several.iter().map(|(name, ..)| name.as_str()).collect();
             Err(format!(
-                "it holds several pictures ({}) and none is named as the one; expected R, G and B without a layer, or one of {}; name it or leave out the others",
+                "it holds several pictures ({}) and none is named as the one; expected R, G and B without a layer, or one of {}; name it, or say which after the file's name (a.exr#layer)",
                 names.join(", "),
                 PICTURE_NAMES.join(", ")
             ))

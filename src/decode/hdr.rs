@@ -6,7 +6,7 @@ use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder};
 
 use super::codes::in_threes;
-use super::{ImageFile, Pixels, broken, check_size, ensure_memory};
+use super::{ImageFile, Pixels, Tags, broken, check_size, ensure_memory};
 
 /// Of a pixel: decoded, and once more while it is copied.
 const BYTES_PER_PX: u64 = 24;
@@ -30,6 +30,8 @@ pub(super) fn read_hdr(bytes: &[u8]) -> Result<ImageFile, String> {
         width,
         height,
         pixels: Pixels::Linear(in_threes(decoded.into_rgb32f().into_raw())),
+        alpha: Vec::new(),
+        tags: Tags::default(),
         warnings,
     })
 }

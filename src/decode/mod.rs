@@ -10,14 +10,20 @@ mod file;
 mod guard;
 mod hdr;
 mod jpeg;
+mod png;
+mod profile;
+mod tags;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use channels::ChannelFile;
 pub(crate) use file::{
     MAX_PICTURE_BYTES, MAX_POSES_BYTES, MAX_TEXT_BYTES, read_file, read_stream, read_text,
 };
 pub(crate) use jpeg::split_jpegs;
+pub use profile::ColourProfile;
+pub use tags::Tags;
+pub(crate) use tags::{turned, turned_size};
 
 use guard::guarded;
 
@@ -26,19 +32,25 @@ pub(crate) const MAX_SIDE_PX: u32 = 32768;
 /// Most pixels of an image.
 pub(crate) const MAX_PIXELS: u64 = 1 << 28;
 
+const ALPHA: &str = "its alpha channel is ignored";
+
 /// An image as its file holds it, grey spread to three channels, alpha left out, row-major from the top left.
 #[derive(Debug)]
 pub(crate) struct ImageFile {
     pub width: u32,
     pub height: u32,
     pub pixels: Pixels,
+    /// 0 to 1, where any is not 1; else empty.
+    pub alpha: Vec<f32>,
+    pub tags: Tags,
     pub warnings: Vec<String>,
 }
 
 #[derive(Debug)]
 pub(crate) enum Pixels {
-    Srgb8(Vec<[u8; 3]>),
-    Srgb16(Vec<[u16; 3]>),
+    /// sRGB, unless the tags bring a profile.
+    Codes8(Vec<[u8; 3]>),
+    Codes16(Vec<[u16; 3]>),
     /// Finite.
     Linear(Vec<[f32; 3]>),
 }
@@ -50,23 +62,50 @@ pub(crate) struct Rgba8 {
     pub pixels: Vec<[u8; 4]>,
 }
 
-/// Reads an image.
+/// The file of a path that may end in `#` and the layer of an OpenEXR file, and that layer.
+pub(crate) fn split_layer(path: &Path) -> (PathBuf, Option<&str>) {
+    let whole = || (path.to_owned(), None);
+    let Some(text) = path.to_str().filter(|_| !path.exists()) else {
+        return whole();
+    };
+    match text.rsplit_once('#') {
+        Some((file, layer)) if file.to_ascii_lowercase().ends_with(".exr") => {
+            (file.into(), Some(layer))
+        }
+        _ => whole(),
+    }
+}
+
+/// Reads an image; of an OpenEXR file the layer after `#`, or else the one that is the picture.
 pub(crate) fn read_image(path: &Path) -> Result<ImageFile, String> {
-    let bytes = read_file(path, MAX_PICTURE_BYTES).map_err(|reason| {
+    let (file, layer) = split_layer(path);
+    let bytes = read_file(&file, MAX_PICTURE_BYTES).map_err(|reason| {
         format!(
             "it cannot be read ({reason}); expected an image file; correct the path or the rights"
         )
     })?;
-    decode_image(&bytes)
+    decode_layer(&bytes, layer)
 }
 
 /// Decodes an image file's bytes.
 pub(crate) fn decode_image(bytes: &[u8]) -> Result<ImageFile, String> {
+    decode_layer(bytes, None)
+}
+
+/// What can be decoded of an image file's bytes that are cut off: of JPEG what there is, of other formats nothing.
+pub(crate) fn decode_cut_image(bytes: &[u8]) -> Option<ImageFile> {
+    match bytes {
+        [0xff, 0xd8, ..] => guarded(|| codes::read_cut_jpeg(bytes)).ok()?.ok(),
+        _ => None,
+    }
+}
+
+fn decode_layer(bytes: &[u8], layer: Option<&str>) -> Result<ImageFile, String> {
     let image = guarded(|| match bytes {
         [0x89, b'P', b'N', b'G', ..] => codes::read_png(bytes),
         [0xff, 0xd8, ..] => codes::read_jpeg(bytes),
         [b'#', b'?', ..] => hdr::read_hdr(bytes),
-        [0x76, 0x2f, 0x31, 0x01, ..] => exr::read_picture(bytes),
+        [0x76, 0x2f, 0x31, 0x01, ..] => exr::read_picture(bytes, layer),
         _ => Err("its format is not known; expected PNG, JPEG, OpenEXR or Radiance HDR; convert the image".to_owned()),
     })
     .unwrap_or_else(|thrown| Err(broken(thrown)))?;

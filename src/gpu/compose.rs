@@ -59,6 +59,8 @@ features! {
     delta_lights,
     /// Aperture radius above 0.
     lens,
+    /// A lens of the rational, thin-prism or fisheye model.
+    lens_models,
     /// max_bounces above 1.
     multi_bounce,
     /// Some real material takes its albedo from the photograph.
@@ -118,6 +120,7 @@ impl Features {
                 packed::LIGHT_DIRECTIONAL,
             ]),
             lens: scene.frame.aperture_radius > 0.0,
+            lens_models: scene.frame.lens_model != distortion::LENS_RADIAL,
             multi_bounce: scene.frame.max_bounces > 1,
             photo_albedo: flag(packed::MATERIAL_PHOTO_ALBEDO),
             normal_maps: material(&|m| {

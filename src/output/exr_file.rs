@@ -13,6 +13,7 @@ use exr::prelude::{Vec2, attribute::AttributeValue, attribute::Chromaticities};
 use super::exr_header::sort_attributes;
 use super::target::write_atomically;
 use super::{OutputError, Target};
+use crate::distortion::LENS_FISHEYE;
 use crate::film::{Picture, Planes};
 use crate::renderer::Renderer;
 use crate::scene::{Camera, Estimator, SamplerKind};
@@ -62,7 +63,16 @@ impl Metadata {
         };
         let camera = &self.camera;
         let rows = camera.world_from_camera.transpose().to_cols_array();
-        let distortion = camera.distortion.map(|k| k.to_string()).join(" ");
+        let lens = &camera.distortion;
+        let is_fisheye = lens.model == LENS_FISHEYE;
+        let count = if is_fisheye { 4 } else { 12 };
+        let given = &lens.coefficients[..count];
+        let distortion = given
+            .iter()
+            .map(f64::to_string)
+            .collect::<Vec<_>>()
+            .join(" ");
+        let lens_model = if is_fisheye { "fisheye" } else { "opencv" };
         let filter = if self.filtered {
             "preview: the difference is smoothed, biased"
         } else {
@@ -86,6 +96,7 @@ impl Metadata {
             ("mixray.camera.cx", AttributeValue::F64(camera.cx)),
             ("mixray.camera.cy", AttributeValue::F64(camera.cy)),
             ("mixray.camera.distortion", text(&distortion)),
+            ("mixray.camera.lensModel", text(lens_model)),
             // Rows, column vectors: the scene file's own order.
             (
                 "mixray.camera.worldFromCamera",

@@ -1,4 +1,4 @@
-//! PNG, 8 or 16 bits a channel, sRGB.
+//! PNG, 8 or 16 bits a channel: sRGB, or the photograph's own colours.
 
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
@@ -22,13 +22,14 @@ impl PngBits {
     /// 16 for a 16-bit photograph, else 8.
     pub fn for_photo(photo: Option<&Photo>) -> Self {
         match photo.map(|p| &p.encoded) {
-            Some(EncodedPhoto::Srgb16(_)) => Self::Sixteen,
+            Some(EncodedPhoto::Codes16(_)) => Self::Sixteen,
             _ => Self::Eight,
         }
     }
 }
 
-/// Writes the picture, clamped to 0..1. A pixel that equals the photograph's bit for bit gets the photograph's own code.
+/// Writes the picture, clamped to 0..1. A pixel that equals the photograph's bit for bit gets the photograph's own code;
+/// colours and orientation are as the photograph's tags say.
 ///
 /// # Errors
 /// If the file cannot be written; what was there before then still is.
@@ -44,9 +45,13 @@ pub fn write_png(
             (codes.into_flattened(), ExtendedColorType::Rgb8)
         }
         PngBits::Sixteen => {
-            let codes = codes(picture, photo, encode16, |encoded, pixel| match encoded {
-                EncodedPhoto::Srgb8(codes) => Some(codes[pixel].map(|c| u16::from(c) * 257)),
-                EncodedPhoto::Srgb16(codes) => Some(codes[pixel]),
+            let encode = Encoding {
+                srgb: encode16,
+                of_share: |x| (x * 65535.0 + 0.5).floor() as u16,
+            };
+            let codes = codes(picture, photo, encode, |encoded, pixel| match encoded {
+                EncodedPhoto::Codes8(codes) => Some(codes[pixel].map(|c| u16::from(c) * 257)),
+                EncodedPhoto::Codes16(codes) => Some(codes[pixel]),
                 EncodedPhoto::Linear => None,
             });
             let bytes = bytemuck::cast_slice(codes.as_flattened()).to_vec();
@@ -54,29 +59,57 @@ pub fn write_png(
         }
     };
     write_atomically(target.path(), |file| {
-        PngEncoder::new(file)
+        let failed = |message: String| OutputError::Encode {
+            path: target.path().into(),
+            message,
+        };
+        let mut encoder = PngEncoder::new(file);
+        if let Some(tags) = photo.map(|photo| &photo.tags) {
+            if let Some(profile) = &tags.profile {
+                let set = encoder.set_icc_profile(profile.icc().to_vec());
+                set.map_err(|e| failed(e.to_string()))?;
+            }
+            if let Some(exif) = tags.exif() {
+                let set = encoder.set_exif_metadata(exif);
+                set.map_err(|e| failed(e.to_string()))?;
+            }
+        }
+        encoder
             .write_image(&bytes, picture.width, picture.height, color)
-            .map_err(|e| OutputError::Encode {
-                path: target.path().into(),
-                message: e.to_string(),
-            })
+            .map_err(|e| failed(e.to_string()))
     })
 }
 
-/// sRGB codes of 8 bits as [`write_png`] writes them.
+/// Codes of 8 bits as [`write_png`] writes them.
 pub(crate) fn picture_codes8(picture: &Picture, photo: Option<&Photo>) -> Vec<[u8; 3]> {
-    codes(picture, photo, encode8, |encoded, pixel| match encoded {
-        EncodedPhoto::Srgb8(codes) => Some(codes[pixel]),
+    let encode = Encoding {
+        srgb: encode8,
+        of_share: |x| (x * 255.0 + 0.5).floor() as u8,
+    };
+    codes(picture, photo, encode, |encoded, pixel| match encoded {
+        EncodedPhoto::Codes8(codes) => Some(codes[pixel]),
         _ => None,
     })
 }
 
+/// Codes of linear values, and of encoded ones from 0 to 1.
+struct Encoding<T> {
+    srgb: fn(f32) -> T,
+    of_share: fn(f64) -> T,
+}
+
+/// In the photograph's colours.
 fn codes<T: Copy>(
     picture: &Picture,
     photo: Option<&Photo>,
-    encode: impl Fn(f32) -> T,
+    encode: Encoding<T>,
     own_code: impl Fn(&EncodedPhoto, usize) -> Option<[T; 3]>,
 ) -> Vec<[T; 3]> {
+    let profile = photo.and_then(|photo| photo.tags.profile.as_deref());
+    let of_linear = |value: [f32; 3]| match profile {
+        None => value.map(encode.srgb),
+        Some(profile) => profile.encoded(value).map(encode.of_share),
+    };
     picture
         .linear
         .iter()
@@ -85,7 +118,7 @@ fn codes<T: Copy>(
             photo
                 .filter(|photo| photo.linear[pixel].map(f32::to_bits) == value.map(f32::to_bits))
                 .and_then(|photo| own_code(&photo.encoded, pixel))
-                .unwrap_or_else(|| value.map(&encode))
+                .unwrap_or_else(|| of_linear(*value))
         })
         .collect()
 }
@@ -93,6 +126,7 @@ fn codes<T: Copy>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decode::Tags;
     use crate::scene::srgb::{decode8, decode16};
 
     fn picture(linear: Vec<[f32; 3]>) -> Picture {
@@ -117,7 +151,8 @@ mod tests {
             width: 3,
             height: 1,
             linear: vec![[0.1; 3]; 3],
-            encoded: EncodedPhoto::Srgb8(vec![[7, 8, 9]; 3]),
+            encoded: EncodedPhoto::Codes8(vec![[7, 8, 9]; 3]),
+            tags: Tags::default(),
         };
         let mut result = picture(photo.linear.clone());
         result.linear[1] = [0.1, 0.1, f32::from_bits(0.1f32.to_bits() + 1)];

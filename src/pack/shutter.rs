@@ -128,14 +128,25 @@ fn fastest_step_px(scene: &Scene, opens: f64, closes: f64) -> f64 {
         let places: Vec<DMat4> = (0..=STEPS)
             .map(|i| object.world_from_object_at(time(i)) * instance.object_from_local_at(time(i)))
             .collect();
-        if places.iter().all(|place| *place == places[0]) {
+        if places.iter().all(|place| *place == places[0]) && !instance.deforms() {
             continue;
         }
         longest = longest.max(1.0);
-        for corner in instance.corners() {
+        let corners = instance.corners();
+        // Points of the part at each of the times.
+        let points: Vec<Vec<DVec3>> = (0..=STEPS)
+            .map(|i| match &instance.deformation {
+                Some(deformation) => deformation.sampled_points(time(i)),
+                None => corners.clone(),
+            })
+            .collect();
+        for point in 0..points[0].len() {
             let seen: Vec<Option<DVec3>> = places
                 .iter()
-                .map(|place| project(&scene.camera, place.transform_point3(corner)))
+                .zip(&points)
+                .map(|(place, points)| {
+                    project(&scene.camera, place.transform_point3(points[point]))
+                })
                 .collect();
             let length: f64 = seen
                 .windows(2)

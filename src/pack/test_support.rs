@@ -20,7 +20,7 @@ pub fn test_scene() -> Scene {
             fy: 4.0,
             cx: 2.0,
             cy: 1.5,
-            distortion: [0.0; 5],
+            distortion: crate::scene::Distortion::NONE,
             world_from_camera: DMat4::IDENTITY,
         },
         lens: Lens {
@@ -47,6 +47,7 @@ pub fn test_scene() -> Scene {
             multiple_scattering: false,
             exposure: Exposure::Ev(0.0),
             backdrop: Backdrop::Environment,
+            upright_photo: false,
         },
         inputs: Vec::new(),
         stages: Stages::default(),
@@ -82,6 +83,7 @@ pub fn test_mesh(
         motion: None,
         instances: vec![Instance {
             animation: None,
+            deformation: None,
             object_from_local: DMat4::IDENTITY,
             primitive: primitive.into(),
             material: material.into(),

@@ -30,7 +30,7 @@ shared! {
         pub camera_back: [f32; 4],
         /// fx, fy, cx, cy in pixels.
         pub intrinsics: [f32; 4],
-        /// k1, k2, p1, p2.
+        /// k1, k2, p1, p2; of a fisheye k1 to k4.
         pub distortion: [f32; 4],
         /// Distortion k3.
         pub distortion_k3: f32,
@@ -87,6 +87,8 @@ shared! {
         pub shutter_poses: [[f32; 4]; 2 * SHUTTER_POSES],
         /// Bounding spheres of what photons are sent to, virtual surfaces that mirror or refract: centre, radius.
         pub photon_spheres: [[f32; 4]; MAX_PHOTON_SPHERES],
+        /// k4, k5, k6, s1; s2, s3, s4, unused.
+        pub distortion_more: [[f32; 4]; 2],
         /// 0: no photons are traced.
         pub photon_sphere_count: u32,
         /// Cells of the guide, a power of two; 0: there is none.
@@ -94,6 +96,10 @@ shared! {
         pub guide_cells_per_m: f32,
         /// 1 / distance of the backdrop along the view axis; 0: infinitely far.
         pub inv_backdrop_distance: f32,
+        /// `LENS_*` of `distortion`.
+        pub lens_model: u32,
+        pub pad: u32,
+        pub pad_end: [u32; 2],
     }
 
     pub const APERTURE_DISC: u32 = 0;

@@ -131,7 +131,7 @@ impl Core {
 
     /// The real samples before `end_of_row` that the composite, or a plane, lacks.
     pub fn real_work(&self, end_of_row: impl Fn(usize) -> u32 + Sync) -> WorkList {
-        let everywhere = self.options.all_planes
+        let everywhere = self.options.real_everywhere
             || self.scene.settings.composite == Composite::Quotient
             || self.options.without.contains(Skip::EdgeReal);
         WorkList::real(&self.packed.pixels, &self.film, everywhere, end_of_row)

@@ -76,6 +76,7 @@ impl Renderer {
         entry.motion = None;
         for instance in &mut entry.instances {
             instance.animation = None;
+            instance.deformation = None;
         }
         match entry.side {
             Side::Virtual => {

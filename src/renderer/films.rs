@@ -24,7 +24,8 @@ impl Renderer {
             return Err(sizes.into());
         }
         let options = RendererOptions {
-            all_planes: !film.guides.is_empty(),
+            guides: !film.guides.is_empty(),
+            real_everywhere: !film.guides.is_empty(),
             sample_range: Some((film.first_sample, end)),
             without,
             ..RendererOptions::default()

@@ -9,7 +9,7 @@ use crate::gpu::Changed;
 use crate::pack::{instants, next_anchor};
 use crate::packed::FRAME_SHUTTER;
 use crate::scene::trajectory::CameraPath;
-use crate::scene::{Camera, Exposure, Lens, Photo, Scene};
+use crate::scene::{Camera, Exposure, Instance, Lens, Photo, Scene};
 use crate::work::Watcher;
 
 /// The next frame of a video.
@@ -75,7 +75,13 @@ impl Renderer {
         let stale = matches!(self.driver, Driver::Moving(_));
         let before = placed(&core.scene);
         core.scene.set_time(edit.time_secs);
-        let moved = stale || placed(&core.scene) != before;
+        let parts = core
+            .scene
+            .objects
+            .iter()
+            .flat_map(|object| &object.instances);
+        let deforms = parts.clone().any(Instance::deforms);
+        let moved = stale || deforms || placed(&core.scene) != before;
         let anchor = edit.anchor.unwrap_or_else(|| {
             let camera = core.scene.camera.world_from_camera.w_axis.truncate();
             next_anchor(Some(DVec3::from(core.packed.anchor_m)), camera)

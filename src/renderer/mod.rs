@@ -67,8 +67,10 @@ use crate::scene::{Choice, Combine, Scene, Settings};
 /// What the caller wants beside the scene's own settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RendererOptions {
-    /// Depth, normal and albedo of the first hit, and the real radiance everywhere.
-    pub all_planes: bool,
+    /// Depth, normal and albedo of the first hit.
+    pub guides: bool,
+    /// The real radiance, and with it the mixed, where the composite does not need it too: it may cost several times the rest.
+    pub real_everywhere: bool,
     /// The first and the end of the samples to render of each pixel's `rays_per_pixel`; `None`: all. Films of ranges that follow one
     /// another are put together by [`Renderer::merge`].
     pub sample_range: Option<(u32, u32)>,
@@ -202,14 +204,14 @@ impl Renderer {
             return Err(RenderError::SampleRange(first_sample, end_sample, total));
         }
         let grouped = options.keeps_groups(scene.settings.combine);
-        needs::ensure_scene(&scene, options.all_planes, grouped)?;
+        needs::ensure_scene(&scene, options.guides, grouped)?;
         let packed = PackedScene::build(&scene, watcher)?;
-        needs::ensure_film(&packed, options.all_planes, grouped)?;
+        needs::ensure_film(&packed, options.guides, grouped)?;
         let film = Film::new(
             packed.frame.width,
             packed.frame.height,
             first_sample,
-            options.all_planes,
+            options.guides,
         );
         let mut renderer = Self {
             core: Core {

@@ -16,7 +16,7 @@ const PICTURE_BYTES: u64 = size_of::<PixelInfo>() as u64 + 12 + 6;
 const PLANES_BYTES: u64 = 29 * 4 * 2;
 
 /// Before the scene is packed.
-pub(super) fn ensure_scene(scene: &Scene, all_planes: bool, grouped: bool) -> Result<(), Shortage> {
+pub(super) fn ensure_scene(scene: &Scene, guides: bool, grouped: bool) -> Result<(), Shortage> {
     let triangles = |count: u64| {
         ensure(
             count * TRIANGLE_BYTES,
@@ -35,15 +35,15 @@ pub(super) fn ensure_scene(scene: &Scene, all_planes: bool, grouped: bool) -> Re
     }
     let (width, height) = (scene.camera.width, scene.camera.height);
     let pixels = u64::from(width) * u64::from(height);
-    let shown = pixels * (PICTURE_BYTES + if all_planes { PLANES_BYTES } else { 0 });
-    let mapped = shown + pixels * film_bytes(all_planes, grouped);
+    let shown = pixels * (PICTURE_BYTES + if guides { PLANES_BYTES } else { 0 });
+    let mapped = shown + pixels * film_bytes(guides, grouped);
     ensure_lazy(mapped, shown, &picture(width, height))
 }
 
 /// Before the film is made: of its pixels only those within reach are ever written.
 pub(super) fn ensure_film(
     packed: &PackedScene,
-    all_planes: bool,
+    guides: bool,
     grouped: bool,
 ) -> Result<(), Shortage> {
     let within_reach = (packed.pixels.iter())
@@ -54,20 +54,16 @@ pub(super) fn ensure_film(
         true => packed.pixels.len() as u64 * size_of::<SplatSums>() as u64,
         false => 0,
     };
-    let each = film_bytes(all_planes, grouped);
+    let each = film_bytes(guides, grouped);
     let mapped = packed.pixels.len() as u64 * each + splats;
     let touched = within_reach * each + splats;
     ensure_lazy(mapped, touched, &picture(width, height))
 }
 
-fn film_bytes(all_planes: bool, grouped: bool) -> u64 {
-    let guides = if all_planes {
-        size_of::<GuideSums>()
-    } else {
-        0
-    };
+fn film_bytes(guides: bool, grouped: bool) -> u64 {
+    let guide_bytes = if guides { size_of::<GuideSums>() } else { 0 };
     let groups = if grouped { size_of::<GroupSums>() } else { 0 };
-    (size_of::<PixelSums>() + guides + groups) as u64
+    (size_of::<PixelSums>() + guide_bytes + groups) as u64
 }
 
 fn picture(width: u32, height: u32) -> String {

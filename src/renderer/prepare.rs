@@ -63,7 +63,7 @@ impl Renderer {
     /// What follows from the real world and its light: exposure, and albedo from the photograph.
     pub(super) fn prepare_photo(&mut self, watcher: &Watcher<'_>) {
         let core = &mut self.core;
-        if core.options.all_planes {
+        if core.options.guides {
             core.packed.frame.flags |= FRAME_AOVS;
         }
         let from_photo = (core.packed.materials.iter())
@@ -125,7 +125,7 @@ impl Renderer {
             core.film.width,
             core.film.height,
             core.film.first_sample,
-            core.options.all_planes,
+            core.options.guides,
         );
         let factors = core.packed.pixels.iter().map(|p| p.sample_factor);
         core.film.set_sample_factors(factors);

@@ -53,6 +53,7 @@ fn scene_with_a_photo(albedo_from_photo: bool) -> Scene {
         height: 3,
         linear: vec![[0.5; 3]; 12],
         encoded: EncodedPhoto::Linear,
+        tags: Default::default(),
     });
     scene
 }

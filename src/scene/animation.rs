@@ -72,11 +72,18 @@ pub struct AnimatedNode {
     pub translation: Option<Track>,
     pub rotation: Option<Track>,
     pub scale: Option<Track>,
+    /// Of its mesh's morph targets, four a track.
+    pub weights: Vec<Track>,
 }
 
 impl AnimatedNode {
     fn moves(&self) -> bool {
         self.translation.is_some() || self.rotation.is_some() || self.scale.is_some()
+    }
+
+    /// The shape of its mesh changes.
+    pub fn morphs(&self) -> bool {
+        !self.weights.is_empty()
     }
 
     fn at(&self, time_secs: f64) -> DMat4 {
@@ -119,12 +126,29 @@ impl Animation {
 
     /// The transform from a node to the file's space.
     pub fn object_from_node(&self, node: usize, time_secs: f64) -> DMat4 {
-        let within = match self.duration_secs > 0.0 {
-            true => time_secs.rem_euclid(self.duration_secs),
-            false => 0.0,
-        };
+        let within = self.within(time_secs);
         self.ancestry(node)
             .fold(DMat4::IDENTITY, |m, node| self.nodes[node].at(within) * m)
+    }
+
+    /// Weights of the morph targets of a node's mesh; those at `rest` where nothing moves them.
+    pub fn weights(&self, node: usize, time_secs: f64, rest: &[f64]) -> Vec<f64> {
+        let tracks = &self.nodes[node].weights;
+        if tracks.is_empty() {
+            return rest.to_vec();
+        }
+        let within = self.within(time_secs);
+        let fours = tracks
+            .iter()
+            .map(|track| track.at(within, false).to_array());
+        fours.flatten().collect()
+    }
+
+    fn within(&self, time_secs: f64) -> f64 {
+        match self.duration_secs > 0.0 {
+            true => time_secs.rem_euclid(self.duration_secs),
+            false => 0.0,
+        }
     }
 
     fn ancestry(&self, node: usize) -> impl Iterator<Item = usize> {
@@ -137,10 +161,16 @@ impl Animation {
 pub struct InstanceAnimation {
     pub animation: Arc<Animation>,
     pub node: usize,
+    /// Of one of several copies that the node carries.
+    pub node_from_local: DMat4,
 }
 
 impl InstanceAnimation {
     pub fn object_from_local(&self, time_secs: f64) -> DMat4 {
-        self.animation.object_from_node(self.node, time_secs)
+        let object_from_node = self.animation.object_from_node(self.node, time_secs);
+        match self.node_from_local == DMat4::IDENTITY {
+            true => object_from_node,
+            false => object_from_node * self.node_from_local,
+        }
     }
 }

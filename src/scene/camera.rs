@@ -8,7 +8,7 @@ use super::pose::read_camera_pose;
 use super::projection::check_distortion;
 use super::reader::{Node, Table};
 use super::trajectory::Intrinsics;
-use super::{Aperture, Camera, Lens, Photo};
+use super::{Aperture, Camera, Distortion, Lens, Photo};
 
 const CAMERA_KEYS: &[&str] = &[
     "width",
@@ -19,6 +19,7 @@ const CAMERA_KEYS: &[&str] = &[
     "cx",
     "cy",
     "distortion",
+    "lens_model",
     "world_from_camera",
     "position",
     "look_at",
@@ -83,21 +84,41 @@ pub(super) fn read_camera(
         fy,
         cx: table.optional("cx", Node::finite)?.unwrap_or(half(width)),
         cy: table.optional("cy", Node::finite)?.unwrap_or(half(height)),
-        distortion: table
-            .optional("distortion", |node| node.vector::<5>())?
-            .unwrap_or_default(),
+        distortion: read_distortion(&table)?.unwrap_or(Distortion::NONE),
         world_from_camera: read_camera_pose(&table)?,
     };
-    table.optional("distortion", |node| {
-        check_distortion(&camera).map_err(|problem| {
-            node.error(
-                problem,
-                "coefficients (OpenCV's k1 k2 p1 p2 k3) that reach every pixel",
-                "correct them or `fx` and `fy`",
-            )
-        })
+    check_distortion(&camera).map_err(|problem| {
+        let at = table.get("distortion").or_else(|| table.get("lens_model"));
+        let (expected, mend) = (
+            "coefficients that reach every pixel (OpenCV's k1 k2 p1 p2 k3, or k1 k2 k3 k4 of a fisheye)",
+            "correct them or `fx` and `fy`",
+        );
+        match at {
+            Some(node) => node.error(problem, expected, mend),
+            None => table.error(problem, expected, mend),
+        }
     })?;
     Ok(camera)
+}
+
+/// `distortion` and `lens_model`; `None`: neither is there.
+pub(super) fn read_distortion(table: &Table) -> Result<Option<Distortion>> {
+    let is_fisheye = table.optional("lens_model", |node| match node.string()? {
+        "opencv" => Ok(false),
+        "fisheye" => Ok(true),
+        _ => Err(node.impossible("\"opencv\" or \"fisheye\"")),
+    })?;
+    if is_fisheye == Some(true) {
+        let k = table.optional("distortion", |node| node.vector::<4>())?;
+        return Ok(Some(Distortion::fisheye(k.unwrap_or_default())));
+    }
+    let given = table.optional("distortion", |node| match node.len() {
+        Some(4) => Ok(node.vector::<4>()?.to_vec()),
+        Some(8) => Ok(node.vector::<8>()?.to_vec()),
+        Some(12) => Ok(node.vector::<12>()?.to_vec()),
+        _ => Ok(node.vector::<5>()?.to_vec()),
+    })?;
+    Ok(given.and_then(|k| Distortion::opencv(&k)))
 }
 
 fn read_side(table: &Table, key: &str, photo_side: Option<u32>) -> Result<u32> {
@@ -157,6 +178,19 @@ pub(super) fn read_lens(root: &Table) -> Result<Lens> {
             "add it",
         ));
     }
+    let focal_length_m = table
+        .optional("focal_length_mm", Node::positive)?
+        .map_or(0.0, |mm| mm / 1000.0);
+    table.optional("focus_distance_m", |node| match focus {
+        Some(focus) if focus <= focal_length_m => Err(node.error(
+            format!(
+                "`focus_distance_m` is {focus}, nearer than the focal length of {focal_length_m} m"
+            ),
+            "a distance beyond the focal length: no lens makes a picture of what is nearer",
+            "correct one of them",
+        )),
+        _ => Ok(()),
+    })?;
     Ok(Lens {
         aperture_radius_m,
         focus_distance_m: focus.unwrap_or(pinhole.focus_distance_m),

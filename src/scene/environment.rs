@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::error::Result;
 use super::reader::{MAX_RADIANCE, Node, Table};
-use super::srgb::{decode8, decode16};
 use super::{Environment, EnvironmentMap};
 use crate::decode::{Pixels, read_image};
 
@@ -53,7 +52,7 @@ fn read_lat_long(node: &Node, warnings: &mut Vec<String>) -> Result<EnvironmentM
     let path = node.existing_file()?;
     let image = read_image(&path).map_err(|problem| node.file_error(&path, problem))?;
     let (width, height) = (image.width, image.height);
-    let mut notes = image.warnings;
+    let mut notes = image.warnings.clone();
     if width < 2 || height < 2 {
         let problem = format!(
             "it has {width} x {height} pixels; expected at least 2 x 2; use `radiance` for a constant"
@@ -66,15 +65,12 @@ fn read_lat_long(node: &Node, warnings: &mut Vec<String>) -> Result<EnvironmentM
         ));
     }
     let clipped = "it holds encoded 8- or 16-bit colours: its lights are clipped at 1";
+    let decoded = image.linear();
     let mut texels: Vec<[f32; 3]> = match image.pixels {
         Pixels::Linear(linear) => linear,
-        Pixels::Srgb8(codes) => {
+        Pixels::Codes8(_) | Pixels::Codes16(_) => {
             notes.push(clipped.to_owned());
-            codes.iter().map(|code| code.map(decode8)).collect()
-        }
-        Pixels::Srgb16(codes) => {
-            notes.push(clipped.to_owned());
-            codes.iter().map(|code| code.map(decode16)).collect()
+            decoded
         }
     };
     let mut negative = 0;

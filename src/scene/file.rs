@@ -9,7 +9,8 @@ use super::environment::read_environment;
 use super::error::{Result, SceneError, Source};
 use super::light::read_lights;
 use super::object::ObjectReader;
-use super::photo::{read_backdrop, read_photo};
+use super::photo::read_photo;
+use super::projection::check_reach;
 use super::reader::Table;
 use super::sandbox::Sandbox;
 use super::settings::read_settings;
@@ -80,13 +81,20 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
     let root = Table::root(source, document.get_ref());
     root.refuse_unknown(&[TABLES, Stages::TABLES].concat())?;
     let mut warnings = Vec::new();
-    let (photo, exposure) = read_photo(&root, given.photo, &mut warnings)?;
-    let settings = read_settings(&root, exposure, read_backdrop(&root)?)?;
+    let (photo, photo_settings) = read_photo(&root, given.photo, &mut warnings)?;
+    let settings = read_settings(&root, photo_settings)?;
     let stages = Stages::read(&root)?;
     let camera = read_camera(&root, photo.as_ref(), given.intrinsics.as_ref())?;
     let camera_path = read_camera_motion(&root)?;
     let shutter = read_shutter(&root)?;
     let lens = read_lens(&root)?;
+    check_reach(&camera, lens.aperture_radius_m).map_err(|problem| {
+        root.error(
+            problem,
+            "89 degrees off the axis at most with an open aperture",
+            "leave out [lens], or crop the photograph",
+        )
+    })?;
     let environment = read_environment(&root, &mut warnings)?;
     let mut lights = read_lights(&root)?;
     let reader = ObjectReader::new(photo.is_some(), &mut warnings);

@@ -5,6 +5,7 @@
 
 pub mod animation;
 mod camera;
+pub mod deformation;
 mod environment;
 pub(crate) mod error;
 mod file;
@@ -29,12 +30,14 @@ mod tests;
 pub mod trajectory;
 
 // What a scene asks of the camera stages; each declares its own.
+pub use crate::decode::{ColourProfile, Tags};
+pub use crate::distortion::Distortion;
 pub use crate::stages::settings::*;
 pub use error::SceneError;
 pub use file::{Given, load, load_with};
 pub use fingerprint::{Content, ContentHash};
 pub use material::Material;
-pub use photo::read_codes;
+pub use photo::{read_codes, read_coverage};
 pub use reader::Choice;
 pub use settings::Overrides;
 pub use shutter::{MotionKey, ObjectMotion, Shutter};
@@ -83,14 +86,16 @@ pub struct Photo {
     pub linear: Vec<[f32; 3]>,
     /// The encoded samples as read, so that untouched pixels are written back bit for bit.
     pub encoded: EncodedPhoto,
+    /// Written back with them.
+    pub tags: Tags,
 }
 
 #[derive(Clone, Debug)]
 pub enum EncodedPhoto {
-    /// sRGB, 8 bits a channel.
-    Srgb8(Vec<[u8; 3]>),
-    /// sRGB, 16 bits a channel.
-    Srgb16(Vec<[u16; 3]>),
+    /// 8 bits a channel, sRGB unless the tags bring a profile.
+    Codes8(Vec<[u8; 3]>),
+    /// 16 bits a channel.
+    Codes16(Vec<[u16; 3]>),
     /// Linear EXR or HDR: `Photo::linear` is the file's own content.
     Linear,
 }
@@ -106,8 +111,8 @@ pub struct Camera {
     /// Pixels, corner origin: the centre of the first pixel is (0.5, 0.5).
     pub cx: f64,
     pub cy: f64,
-    /// OpenCV k1 k2 p1 p2 k3, ideal to photograph coordinates.
-    pub distortion: [f64; 5],
+    /// Ideal to photograph coordinates.
+    pub distortion: Distortion,
     /// Rigid; the camera looks along its -Z, +Y up.
     pub world_from_camera: DMat4,
 }
@@ -217,6 +222,8 @@ pub struct Instance {
     pub object_from_local: DMat4,
     /// What moves it within its object, if anything does.
     pub animation: Option<animation::InstanceAnimation>,
+    /// What shapes its primitive, if anything does.
+    pub deformation: Option<deformation::Deformation>,
     pub primitive: Arc<Primitive>,
     pub material: Arc<Material>,
 }
@@ -346,4 +353,6 @@ pub struct Settings {
     pub exposure: Exposure,
     /// Means nothing without a photograph.
     pub backdrop: Backdrop,
+    /// Photographs are turned as their tags say.
+    pub upright_photo: bool,
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DMat4, DVec3};
 
+use super::deformation::Deformation;
 use super::error::{Result, SceneError};
 use super::gltf::{GltfScene, PlacedLight, Problem, PunctualLight, load_within};
 use super::material::{lambertian, read_material};
@@ -211,7 +212,7 @@ impl Object {
 
     /// Whether one of its parts moves, with it or by itself.
     pub fn moves(&self, instance: &Instance) -> bool {
-        self.motion.is_some() || instance.animation.is_some()
+        self.motion.is_some() || instance.animation.is_some() || instance.deforms()
     }
 
     /// World-from-object at a time.
@@ -236,6 +237,11 @@ impl Object {
 }
 
 impl Instance {
+    /// Its shape changes with time.
+    pub fn deforms(&self) -> bool {
+        self.deformation.as_ref().is_some_and(Deformation::moves)
+    }
+
     pub fn object_from_local_at(&self, time_secs: f64) -> DMat4 {
         match &self.animation {
             Some(animation) => animation.object_from_local(time_secs),
@@ -305,6 +311,7 @@ fn read_shape(shape: Shape, table: &Table) -> Result<Parts> {
         name: shape.name().to_owned(),
         instances: vec![Instance {
             animation: None,
+            deformation: None,
             object_from_local: DMat4::IDENTITY,
             primitive: Arc::new(shape.read(table)?),
             material: Arc::new(Material::default()),

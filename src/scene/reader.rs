@@ -11,6 +11,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{Result, SceneError, Source};
 use super::sandbox::Sandbox;
+use crate::decode::split_layer;
 
 /// Lengths and coordinates beyond this have no meaning in f32 arithmetic that squares them.
 pub(crate) const MAX_MAGNITUDE: f64 = 1e15;
@@ -239,11 +240,12 @@ impl<'a> Node<'a> {
         })
     }
 
-    /// The file that this string names, relative to the scene file's folder.
+    /// The file that this string names, relative to the scene file's folder, with the layer after it if one is named.
     pub fn existing_file(&self) -> Result<PathBuf> {
         let path = self.named_path()?;
-        if path.is_file() {
-            self.source.files.borrow_mut().push(path.clone());
+        let (file, _) = split_layer(&path);
+        if file.is_file() {
+            self.source.files.borrow_mut().push(file);
             return Ok(path);
         }
         Err(self.error(
@@ -260,7 +262,8 @@ impl<'a> Node<'a> {
 
     fn named_path(&self) -> Result<PathBuf> {
         let path = self.source.resolve(self.string()?);
-        match self.sandbox().and_then(|sandbox| sandbox.refusal(&path)) {
+        let (file, _) = split_layer(&path);
+        match self.sandbox().and_then(|sandbox| sandbox.refusal(&file)) {
             Some(refusal) => {
                 let message = format!("`{}` {refusal}", self.label);
                 Err(self.source.error(self.offset, message))

@@ -1,6 +1,7 @@
 //! `[render]`, and the flags that win over it.
 
 use super::error::Result;
+use super::photo::PhotoSettings;
 use super::reader::{Choice, Node, Table};
 use super::{
     Backdrop, BackendChoice, Combine, Composite, Estimator, Exposure, SamplerKind, Settings, Side,
@@ -54,6 +55,7 @@ impl Default for Settings {
             exposure: Exposure::Ev(0.0),
             backdrop: Backdrop::Photograph(None),
             multiple_scattering: true,
+            upright_photo: false,
         }
     }
 }
@@ -105,15 +107,12 @@ const KEYS: &[&str] = &[
     "multiple_scattering",
 ];
 
-/// `[render]`; exposure and backdrop stand in `[photo]`.
-pub(super) fn read_settings(
-    root: &Table,
-    exposure: Exposure,
-    backdrop: Backdrop,
-) -> Result<Settings> {
+/// `[render]`; what stands in `[photo]` is given.
+pub(super) fn read_settings(root: &Table, photo: PhotoSettings) -> Result<Settings> {
     let mut settings = Settings {
-        exposure,
-        backdrop,
+        exposure: photo.exposure,
+        backdrop: photo.backdrop,
+        upright_photo: photo.upright_photo,
         ..Settings::default()
     };
     if let Some(table) = root.table("render", "[render]", KEYS)? {

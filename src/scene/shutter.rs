@@ -1,5 +1,7 @@
 //! `[shutter]` and what moves while it is open: `[[camera.motion]]` and `[[virtual.motion]]`.
 
+use std::sync::Arc;
+
 use glam::{DMat4, DQuat, DVec3};
 
 use super::Scene;
@@ -108,6 +110,9 @@ impl Scene {
             object.world_from_object = object.world_from_object_at(time_secs);
             for instance in &mut object.instances {
                 instance.object_from_local = instance.object_from_local_at(time_secs);
+                if let Some(deformation) = instance.deformation.as_ref().filter(|d| d.moves()) {
+                    instance.primitive = Arc::new(deformation.at(time_secs));
+                }
             }
         }
     }

@@ -14,7 +14,7 @@ use crate::decode::{MAX_TEXT_BYTES, read_text};
 use crate::pack::camera::frame_camera;
 use crate::packed::Frame;
 use crate::scene::projection::project;
-use crate::scene::trajectory::{EntryKey, FrameName, KnownPoint, Trajectory};
+use crate::scene::trajectory::{EntryKey, Focal, FrameName, KnownPoint};
 use crate::scene::{Camera, Lens};
 use crate::video::FrameSource;
 
@@ -76,7 +76,7 @@ pub fn check_poses(
     let (mut used, mut without_pose, mut behind) = (0u64, 0u64, 0u64);
     let mut own_camera: Option<(Camera, Lens)> = None;
     for point in &points {
-        let name = frame_of(&point.key, &files.trajectory);
+        let name = frame_of(&point.key);
         let view = views.of(&name)?;
         let Some(pose) = view.world_from_camera else {
             without_pose += 1;
@@ -87,18 +87,14 @@ pub fn check_poses(
                 let size = intrinsics
                     .size
                     .or_else(|| source.as_ref()?.header().map(|h| (h.width, h.height)));
+                if size.is_none() && matches!(intrinsics.focal, Focal::FieldOfView(_)) {
+                    return Err(SequenceError::Unfit(format!(
+                        "{}: its field of view is of pictures whose size is not told; expected a width and a height beside it; add them",
+                        files.trajectory.path.display()
+                    )));
+                }
                 let size = size.unwrap_or((32768, 32768));
-                let camera = Camera {
-                    width: size.0,
-                    height: size.1,
-                    fx: intrinsics.fx,
-                    fy: intrinsics.fy,
-                    cx: intrinsics.cx,
-                    cy: intrinsics.cy,
-                    distortion: intrinsics.distortion,
-                    world_from_camera: pose,
-                };
-                (camera, None)
+                (intrinsics.camera_of_any_size(size, pose), None)
             }
             (None, Some((camera, lens))) => (camera.clone(), Some(*lens)),
             (None, None) => {
@@ -180,23 +176,19 @@ fn table(errors: &BTreeMap<String, Errors>, used: u64, without_pose: u64, behind
     text
 }
 
-fn frame_of(key: &EntryKey, trajectory: &Trajectory) -> FrameName {
-    match key {
-        EntryKey::Number(number) => FrameName {
-            label: format!("frame {number}"),
-            file: None,
-            number: *number,
-        },
-        EntryKey::Name(name) => FrameName {
-            label: name.clone(),
-            file: Some(name.clone()),
-            number: 0,
-        },
-        EntryKey::Time => FrameName {
-            label: trajectory.path.display().to_string(),
-            file: None,
-            number: 0,
-        },
+fn frame_of(key: &EntryKey) -> FrameName {
+    let (label, file, number) = match key {
+        EntryKey::Number(number) | EntryKey::Order(number) => {
+            (format!("frame {number}"), None, *number)
+        }
+        EntryKey::Name(name) => (name.clone(), Some(name.clone()), 0),
+    };
+    FrameName {
+        label,
+        file,
+        number,
+        place: number,
+        time_secs: None,
     }
 }
 

@@ -1,5 +1,6 @@
 //! The frames one after the other.
 
+use std::collections::HashSet;
 use std::path::Path;
 use std::time::Instant;
 
@@ -18,7 +19,7 @@ use crate::scene::{
     BackendChoice, Camera, Content, ContentHash, Exposure, Lens, MotionBlurMethod, Scene,
 };
 use crate::stages::{Finished, GpuStages, finish};
-use crate::video::{FrameSink, FrameSource, Header, SinkPlan, VideoFrame};
+use crate::video::{FrameSink, FrameSource, Header, Matrix, Pixels, SinkPlan, Taken, VideoFrame};
 
 /// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
 const REACH_FRAMES: f64 = 1.5;
@@ -49,9 +50,12 @@ pub fn render_sequence(
         )
     })?;
     let mut source = FrameSource::open(frames)?;
+    if let Some(matrix) = options.matrix {
+        source.set_matrix(matrix);
+    }
     let rate = known_rate(options, &files.trajectory, Some(&source));
     let views = views(&files.trajectory, rate, source.is_stream())?;
-    check_frames(options, &source, &views)?;
+    check_frames(options, &source, &views, hear)?;
     let names: Option<Vec<FrameName>> = source.names().map(|names| {
         names
             .into_iter()
@@ -76,6 +80,7 @@ pub fn render_sequence(
         span: span(options, &source),
         names: names.unwrap_or_default(),
         hear,
+        told: HashSet::new(),
         started: None,
         frames: FrameCounts::default(),
         seconds: SequenceSeconds::default(),
@@ -88,19 +93,30 @@ pub fn render_sequence(
         }
         let begin = Instant::now();
         let wanted = |name: &FrameName| in_range(options, name);
-        let Some((name, frame)) = source.next(&wanted)? else {
+        let Some((name, taken)) = source.next(&wanted)? else {
             break true;
         };
         sequence.seconds.load += begin.elapsed().as_secs_f64();
         if options.range.is_some_and(|(_, to)| name.number >= to) {
             break true;
         }
-        let Some(frame) = frame else { continue };
         let (label, number) = (name.label.as_str(), name.number);
-        hear(&Event::Begins { label, number });
         let header = source.header().cloned();
-        if !sequence.take(&name, frame, header, watcher)? {
-            break false;
+        match taken {
+            Taken::Skipped => continue,
+            Taken::Whole(frame) => {
+                hear(&Event::Begins { label, number });
+                if !sequence.take(&name, frame, header, watcher)? {
+                    break false;
+                }
+            }
+            Taken::Damaged { problem, rest } => {
+                if !options.pass_damaged_frames {
+                    return Err(problem.into());
+                }
+                hear(&Event::Begins { label, number });
+                sequence.pass_damaged(&name, &problem.to_string(), rest, header)?;
+            }
         }
         hear(&Event::Ends { label, number });
     };
@@ -126,6 +142,8 @@ struct Sequence<'a> {
     /// The frames to come, where they are known.
     names: Vec<FrameName>,
     hear: &'a dyn Fn(&Event<'_>),
+    /// Warnings of frames.
+    told: HashSet<String>,
     started: Option<Started>,
     frames: FrameCounts,
     seconds: SequenceSeconds,
@@ -137,6 +155,8 @@ struct Sequence<'a> {
 struct Started {
     sink: FrameSink,
     size: (u32, u32),
+    /// Frames are turned as their tags say.
+    upright: bool,
     lens: Lens,
     /// The scene file's own, where nobody else brings intrinsics.
     camera: Camera,
@@ -155,20 +175,27 @@ impl Sequence<'_> {
     fn take(
         &mut self,
         name: &FrameName,
-        frame: VideoFrame,
+        mut frame: VideoFrame,
         header: Option<Header>,
         watcher: &Watcher<'_>,
     ) -> Result<bool, SequenceError> {
         let view = self.views.of(name)?;
+        // What all frames have alike is told once.
         for warning in &frame.warnings {
-            (self.hear)(&Event::Warning(format!("{}: {warning}", name.label)));
+            if self.told.insert(warning.clone()) {
+                (self.hear)(&Event::Warning(format!("{}: {warning}", name.label)));
+            }
         }
-        let size = (frame.photo.width, frame.photo.height);
         let started = match self.started.take() {
             Some(started) => started,
             None => self.start(&view, &frame, header)?,
         };
         let started = self.started.insert(started);
+        if started.upright && frame.photo.is_turned() {
+            frame.photo = frame.photo.upright();
+            frame.pixels = Pixels::Decoded;
+        }
+        let size = (frame.photo.width, frame.photo.height);
         if size != started.size {
             return Err(SequenceError::Unfit(format!(
                 "{}: it has {} x {} pixels where the frames before have {} x {}; expected frames of one size; scale it, then go on with the same command",
@@ -309,6 +336,47 @@ impl Sequence<'_> {
         Ok(true)
     }
 
+    /// A frame of which a part is lost goes on as it is, or is left out where there is nothing of it: so the others keep their names, and in
+    /// a film their places.
+    fn pass_damaged(
+        &mut self,
+        name: &FrameName,
+        problem: &str,
+        rest: Option<VideoFrame>,
+        header: Option<Header>,
+    ) -> Result<(), SequenceError> {
+        let reason = problem.split("; ").next().unwrap_or(problem);
+        let tell = |what: &str| (self.hear)(&Event::Warning(format!("{reason}; {what}")));
+        let Some(frame) = rest else {
+            if let Some(started) = &mut self.started
+                && started.sink.repeat()?
+            {
+                tell("the frame before stands for it");
+                self.frames.passed_through += 1;
+            } else {
+                tell("the frame is left out");
+            }
+            return Ok(());
+        };
+        tell("the frame passes through");
+        let view = self.views.of(name)?;
+        let started = match self.started.take() {
+            Some(started) => started,
+            None => self.start(&view, &frame, header)?,
+        };
+        let started = self.started.insert(started);
+        if let Some(position) = view.world_from_camera.map(|pose| pose.w_axis.truncate()) {
+            started.anchor = Some(next_anchor(started.anchor, position));
+        }
+        if started.sink.has(name, &frame)? {
+            self.frames.kept += 1;
+            return Ok(());
+        }
+        started.sink.pass(name, &frame)?;
+        self.frames.passed_through += 1;
+        Ok(())
+    }
+
     fn start(
         &self,
         view: &FrameView,
@@ -321,12 +389,17 @@ impl Sequence<'_> {
         check_rate(&scene, self.rate, self.views.have_own_times())?;
         let size = (frame.photo.width, frame.photo.height);
         // The photograph of the moment is no part of what the frames are made with.
-        scene.photo = None;
+        let size = scene
+            .photo
+            .take()
+            .map_or(size, |photo| (photo.width, photo.height));
         let options = self.options;
+        let mut header = header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate));
+        header.matrix = options.matrix.unwrap_or(header.matrix);
         let sink = FrameSink::open(SinkPlan {
             path: &options.output,
             fingerprint: self.fingerprint(&scene),
-            header: header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate)),
+            header,
             png_bits: options.png_bits,
             overwrite: options.overwrite,
             names: self.names.clone(),
@@ -335,6 +408,7 @@ impl Sequence<'_> {
             sink,
             size,
             lens: scene.lens,
+            upright: scene.settings.upright_photo,
             camera: scene.camera.clone(),
             seed: scene.settings.seed,
             renderer: None,
@@ -366,6 +440,8 @@ impl Sequence<'_> {
         format!("{:?} {:?}", options.filter, options.goal).add_to(&mut hash);
         (&poses.entries, (poses.intrinsics, self.files.intrinsics)).add_to(&mut hash);
         (self.rate, (options.focus_pull_m, scope)).add_to(&mut hash);
+        options.matrix.map(Matrix::name).add_to(&mut hash);
+        self.views.folder_of(&self.names).add_to(&mut hash);
         hash.finish()
     }
 
@@ -377,6 +453,7 @@ impl Sequence<'_> {
                 frames.display()
             )));
         };
+        let film_colours = started.sink.film_colours();
         if complete {
             started.sink.finish()?;
         }
@@ -386,6 +463,7 @@ impl Sequence<'_> {
             self.rays,
             self.non_finite_samples,
             started.renderer.as_ref(),
+            film_colours,
         );
         Ok(RenderedSequence { stats, complete })
     }

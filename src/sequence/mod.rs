@@ -31,7 +31,7 @@ use crate::output::{OutputError, PngBits};
 use crate::renderer::{Filter, Goal, RenderError, Without};
 use crate::scene::trajectory::TrajectoryError;
 use crate::scene::{Overrides, SceneError};
-use crate::video::VideoError;
+use crate::video::{Matrix, VideoError};
 
 /// What is rendered, over which frames, to where.
 #[derive(Clone, Debug)]
@@ -58,6 +58,10 @@ pub struct SequenceOptions {
     pub range: Option<(u32, u32)>,
     /// Numbers may be missing among the frames of a folder.
     pub allow_gaps: bool,
+    /// Frames of which a part is lost are named and go on as they are; else they are errors.
+    pub pass_damaged_frames: bool,
+    /// Of the Y'CbCr of films; by their height where it is not given.
+    pub matrix: Option<Matrix>,
     /// Where neither the frames nor the trajectory tell.
     pub frames_per_second: Option<f64>,
     /// Focus distance over the range, from the first to the last frame, at a constant rate in 1/m.
@@ -90,6 +94,8 @@ impl SequenceOptions {
             output: output.into(),
             range: None,
             allow_gaps: false,
+            pass_damaged_frames: false,
+            matrix: None,
             frames_per_second: None,
             focus_pull_m: None,
             overwrite: false,

@@ -98,6 +98,7 @@ pub(super) fn check_frames(
     options: &SequenceOptions,
     source: &FrameSource,
     views: &Views<'_>,
+    hear: &dyn Fn(&Event<'_>),
 ) -> Result<(), SequenceError> {
     let Some(names) = source.names() else {
         return Ok(());
@@ -107,7 +108,7 @@ pub(super) fn check_frames(
         .iter()
         .filter(|name| in_range(options, name))
         .collect();
-    let (Some(first), Some(last)) = (wanted.first(), wanted.last()) else {
+    if wanted.is_empty() {
         return Err(SequenceError::Unfit(format!(
             "{}: it holds no frame of the range; expected frames numbered {} to {}; correct --range",
             frames.display(),
@@ -115,23 +116,61 @@ pub(super) fn check_frames(
             names.last().map_or(0, |name| name.number)
         )));
     };
-    if !options.allow_gaps {
-        let (from, to) = options.range.unwrap_or((first.number, last.number + 1));
-        let mut numbers = wanted.iter().map(|name| name.number).peekable();
-        for number in from..to {
-            if numbers.next_if_eq(&number).is_none() {
-                return Err(SequenceError::Unfit(format!(
-                    "{}: frame {number} is missing; expected all frames from {from} to {}; add it, or say --allow-gaps",
-                    frames.display(),
-                    to - 1
-                )));
-            }
-        }
+    check_gaps(options, frames, &wanted)?;
+    if views.pairs_in_order(&names) && views.len() > names.len() {
+        hear(&Event::Warning(format!(
+            "{}: it holds {} poses for {} frames; they are taken in order from the first",
+            options.trajectory.display(),
+            views.len(),
+            names.len()
+        )));
     }
     for name in wanted {
         views.of(name)?;
     }
     Ok(())
+}
+
+/// Numbers follow one another. Time stamps need not, and have places for numbers.
+fn check_gaps(
+    options: &SequenceOptions,
+    frames: &Path,
+    wanted: &[&FrameName],
+) -> Result<(), SequenceError> {
+    let missing = |problem: String| {
+        Err(SequenceError::Unfit(format!(
+            "{}: {problem}; expected all frames of the range; add what is missing, or say --allow-gaps",
+            frames.display()
+        )))
+    };
+    let (Some(first), Some(last), false) = (wanted.first(), wanted.last(), options.allow_gaps)
+    else {
+        return Ok(());
+    };
+    let (from, to) = options.range.unwrap_or((first.number, last.number + 1));
+    if from < first.number {
+        return missing(format!(
+            "frame {from} is missing: the first is {}",
+            first.label
+        ));
+    }
+    for pair in wanted.windows(2) {
+        let next = pair[0].number + 1;
+        if pair[1].number != next {
+            return missing(format!(
+                "frame {next} is missing between {} and {}",
+                pair[0].label, pair[1].label
+            ));
+        }
+    }
+    match last.number + 1 < to {
+        true => missing(format!(
+            "frame {} is missing: the last is {}",
+            last.number + 1,
+            last.label
+        )),
+        false => Ok(()),
+    }
 }
 
 pub(super) fn in_range(options: &SequenceOptions, name: &FrameName) -> bool {

@@ -57,6 +57,8 @@ pub struct SequenceStats {
     pub device: String,
     /// Largest so far, where the system tells.
     pub peak_memory_mib: Option<f64>,
+    /// Matrix and range of what was written, where it is a film.
+    pub film_colours: Option<String>,
 }
 
 impl SequenceStats {
@@ -66,6 +68,7 @@ impl SequenceStats {
         rays: RayCounts,
         non_finite_samples: u64,
         renderer: Option<&Renderer>,
+        film_colours: Option<String>,
     ) -> Self {
         let spent = seconds.of_frames();
         Self {
@@ -80,6 +83,7 @@ impl SequenceStats {
             backend: renderer.map_or("none", Renderer::backend_name).to_owned(),
             device: renderer.map_or_else(String::new, Renderer::device_name),
             peak_memory_mib: peak_memory_mib(),
+            film_colours,
         }
     }
 
@@ -97,6 +101,9 @@ impl SequenceStats {
             text,
             "{rendered} rendered ({moving} in motion), {passed_through} passed through, {kept} kept from before"
         );
+        if let Some(colours) = &self.film_colours {
+            let _ = writeln!(text, "film in {colours} (--matrix)");
+        }
         let each = |seconds: f64| 1e3 * seconds / f64::from(rendered.max(1));
         let _ = write!(
             text,

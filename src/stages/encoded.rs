@@ -15,14 +15,15 @@ pub struct EncodedImage {
 }
 
 impl EncodedImage {
-    /// The stored codes over their largest; linear images (EXR, HDR) are encoded.
+    /// The stored codes over their largest; linear images (EXR, HDR) and those of other colours are encoded.
     pub fn from_photo(photo: &Photo) -> Self {
         let rgb = match &photo.encoded {
-            EncodedPhoto::Srgb8(codes) => codes
+            _ if photo.tags.profile.is_some() => encoded_pixels(&photo.linear),
+            EncodedPhoto::Codes8(codes) => codes
                 .iter()
                 .map(|pixel| pixel.map(|code| f32::from(code) / 255.0))
                 .collect(),
-            EncodedPhoto::Srgb16(codes) => codes
+            EncodedPhoto::Codes16(codes) => codes
                 .iter()
                 .map(|pixel| pixel.map(|code| f32::from(code) / 65535.0))
                 .collect(),

@@ -1,13 +1,15 @@
 //! Frames of a video in and out: folders of pictures, Y4M streams, and runs of JPEG pictures as webcams write them.
 
+mod matrix;
 mod sink;
 mod source;
 mod y4m;
 mod y4m_file;
 mod yuv;
 
+pub use matrix::Matrix;
 pub use sink::{FrameSink, SinkPlan};
-pub use source::{FrameRange, FrameSource, Pixels, VideoFrame};
+pub use source::{FrameRange, FrameSource, Pixels, Taken, VideoFrame};
 pub use y4m::{Chroma, Header, Y4mReader};
 pub use yuv::{decode_yuv, encode_yuv};
 

@@ -9,7 +9,7 @@ use std::ffi::{OsStr, OsString};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::y4m::Header;
+use super::y4m::{GREY, Header};
 use super::y4m_file::{Paths, Y4mFile, write_frame};
 use super::yuv::encode_yuv;
 use super::{Pixels, Place, VideoError, VideoFrame, cannot_write, foreign};
@@ -44,6 +44,8 @@ pub struct FrameSink {
     kind: Kind,
     png_bits: Option<PngBits>,
     header: Header,
+    /// Planes of the last frame of a film that this run has written.
+    last: Vec<u8>,
 }
 
 enum Kind {
@@ -71,7 +73,13 @@ impl FrameSink {
             kind,
             png_bits: plan.png_bits,
             header: plan.header,
+            last: Vec::new(),
         })
+    }
+
+    /// The colours of a film; `None`: pictures are written.
+    pub fn film_colours(&self) -> Option<String> {
+        (!matches!(self.kind, Kind::Folder(_))).then(|| self.header.colours())
     }
 
     /// The frame, the next in order, is finished from an earlier run, and whole. Asked once for each, before it is written; `frame` is what
@@ -107,9 +115,11 @@ impl FrameSink {
             let bits = self.png_bits.unwrap_or_else(|| PngBits::for_photo(photo));
             return Ok(write_png(&target, picture, photo, bits)?);
         }
-        let codes = picture_codes8(picture, Some(&frame.photo));
+        // A film is sRGB: codes of other colours are not kept.
+        let photo = Some(&frame.photo).filter(|photo| photo.tags.profile.is_none());
+        let codes = picture_codes8(picture, photo);
         let before = match (&frame.pixels, &frame.photo.encoded) {
-            (Pixels::Planes(planes), EncodedPhoto::Srgb8(codes)) => {
+            (Pixels::Planes(planes), EncodedPhoto::Codes8(codes)) => {
                 Some((codes.as_slice(), planes.as_slice()))
             }
             _ => None,
@@ -153,7 +163,26 @@ impl FrameSink {
         }
     }
 
+    /// In a film the last frame once more, grey before the first; false in a folder.
+    ///
+    /// # Errors
+    /// As [`FrameSink::write`].
+    pub fn repeat(&mut self) -> Result<bool, VideoError> {
+        let is_there = match &mut self.kind {
+            Kind::Folder(_) => return Ok(false),
+            Kind::Y4mFile(file) => file.has_next()?,
+            Kind::Stdout(_) => false,
+        };
+        if !is_there {
+            let mut planes = std::mem::take(&mut self.last);
+            planes.resize(self.header.frame_bytes(), GREY);
+            self.write_planes(&planes)?;
+        }
+        Ok(true)
+    }
+
     fn write_planes(&mut self, planes: &[u8]) -> Result<(), VideoError> {
+        self.last = planes.to_vec();
         match &mut self.kind {
             Kind::Y4mFile(file) => file.write(planes),
             Kind::Stdout(out) => {

@@ -4,13 +4,14 @@ use std::io::{BufReader, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::y4m::{Header, Y4mReader};
+use super::matrix::Matrix;
+use super::y4m::{Header, Planes, Y4mReader};
 use super::yuv::decode_yuv;
 use super::{Place, VideoError};
-use crate::decode::{read_stream, split_jpegs};
+use crate::decode::{MAX_PICTURE_BYTES, read_file, read_stream, split_jpegs};
 use crate::files;
 use crate::scene::Photo;
-use crate::scene::trajectory::{FrameName, trailing_number};
+use crate::scene::trajectory::{FrameName, Naming};
 
 /// The frame numbers to render, the end not included.
 pub type FrameRange = Range<u32>;
@@ -27,8 +28,8 @@ pub enum Pixels {
     File(PathBuf),
     /// The planes of a Y4M frame.
     Planes(Vec<u8>),
-    /// A JPEG picture of a run of them.
-    Jpeg,
+    /// Nothing but the photograph.
+    Decoded,
 }
 
 #[derive(Clone, Debug)]
@@ -37,6 +38,20 @@ pub struct VideoFrame {
     pub pixels: Pixels,
     /// Of what in the file is ignored.
     pub warnings: Vec<String>,
+}
+
+/// What [`FrameSource::next`] finds.
+#[derive(Debug)]
+pub enum Taken {
+    /// Not wanted.
+    Skipped,
+    Whole(VideoFrame),
+    /// The frame after it is found all the same.
+    Damaged {
+        problem: VideoError,
+        /// What there is of it, if anything can be decoded.
+        rest: Option<VideoFrame>,
+    },
 }
 
 /// Frames in their order.
@@ -87,13 +102,25 @@ impl FrameSource {
         }
     }
 
+    /// Reads a Y4M stream with other colours than its height stands for.
+    pub fn set_matrix(&mut self, matrix: Matrix) {
+        if let Kind::Y4m(reader) = &mut self.kind {
+            reader.set_matrix(matrix);
+        }
+    }
+
     /// All frames, where they are known before they are read.
     pub fn names(&self) -> Option<Vec<FrameName>> {
         match &self.kind {
             Kind::Folder(files) => Some(files.iter().map(|(name, _)| name.clone()).collect()),
             Kind::Jpegs { frames, place, .. } => {
                 let numbers = 0..frames.len() as u32;
-                Some(numbers.map(|number| of_stream(number, place)).collect())
+                let stream = place.to_string();
+                Some(
+                    numbers
+                        .map(|number| FrameName::of_stream(number, &stream))
+                        .collect(),
+                )
             }
             Kind::Y4m(_) => None,
         }
@@ -102,49 +129,39 @@ impl FrameSource {
     /// The next frame, decoded where `wanted` says so; `None` after the last.
     ///
     /// # Errors
-    /// It cannot be read or decoded.
+    /// Nothing more can be read.
     pub fn next(
         &mut self,
         wanted: &dyn Fn(&FrameName) -> bool,
-    ) -> Result<Option<(FrameName, Option<VideoFrame>)>, VideoError> {
+    ) -> Result<Option<(FrameName, Taken)>, VideoError> {
         let index = self.next;
         self.next += 1;
         match &mut self.kind {
-            Kind::Folder(files) => {
-                let Some((name, path)) = files.get(index as usize) else {
-                    return Ok(None);
+            Kind::Folder(files) => Ok(files.get(index as usize).map(|(name, path)| {
+                let taken = match wanted(name) {
+                    true => take_picture(path),
+                    false => Taken::Skipped,
                 };
-                let frame = wanted(name).then(|| read_picture(path)).transpose()?;
-                Ok(Some((name.clone(), frame)))
-            }
+                (name.clone(), taken)
+            })),
             Kind::Jpegs {
                 bytes,
                 frames,
                 place,
-            } => {
-                let Some(range) = frames.get(index as usize) else {
-                    return Ok(None);
+            } => Ok(frames.get(index as usize).map(|range| {
+                let name = FrameName::of_stream(index, &place.to_string());
+                let taken = match wanted(&name) {
+                    true => take_jpeg(&bytes[range.clone()], index, place),
+                    false => Taken::Skipped,
                 };
-                let name = of_stream(index, place);
-                if !wanted(&name) {
-                    return Ok(Some((name, None)));
-                }
-                let decoded = Photo::decode(&bytes[range.clone()]);
-                let (photo, warnings) =
-                    decoded.map_err(|problem| place.error(format!("frame {index}: {problem}")))?;
-                let frame = VideoFrame {
-                    photo,
-                    pixels: Pixels::Jpeg,
-                    warnings,
-                };
-                Ok(Some((name, Some(frame))))
-            }
+                (name, taken)
+            })),
             Kind::Y4m(reader) => {
-                let Some(planes) = reader.next_frame()? else {
+                let Some(frame) = reader.next_frame()? else {
                     return Ok(None);
                 };
-                let name = of_stream(index, reader.place());
-                let frame = wanted(&name).then(|| {
+                let name = FrameName::of_stream(index, &reader.place().to_string());
+                let of_planes = |planes: Vec<u8>| {
                     let header = reader.header();
                     let codes = decode_yuv(header, &planes);
                     VideoFrame {
@@ -152,18 +169,45 @@ impl FrameSource {
                         pixels: Pixels::Planes(planes),
                         warnings: Vec::new(),
                     }
-                });
-                Ok(Some((name, frame)))
+                };
+                let taken = match (wanted(&name), frame) {
+                    (false, _) => Taken::Skipped,
+                    (
+                        true,
+                        Planes {
+                            planes,
+                            problem: None,
+                        },
+                    ) => Taken::Whole(of_planes(planes)),
+                    (
+                        true,
+                        Planes {
+                            planes,
+                            problem: Some(problem),
+                        },
+                    ) => Taken::Damaged {
+                        problem,
+                        rest: Some(of_planes(planes)),
+                    },
+                };
+                Ok(Some((name, taken)))
             }
         }
     }
 }
 
-fn of_stream(number: u32, place: &Place) -> FrameName {
-    FrameName {
-        label: format!("frame {number} of {place}"),
-        file: None,
-        number,
+fn take_jpeg(bytes: &[u8], index: u32, place: &Place) -> Taken {
+    let frame = |photo, warnings| VideoFrame {
+        photo,
+        pixels: Pixels::Decoded,
+        warnings,
+    };
+    match Photo::decode(bytes) {
+        Ok((photo, warnings)) => Taken::Whole(frame(photo, warnings)),
+        Err(problem) => Taken::Damaged {
+            problem: place.error(format!("frame {index}: {problem}")),
+            rest: Photo::decode_cut(bytes).map(|photo| frame(photo, Vec::new())),
+        },
     }
 }
 
@@ -174,16 +218,25 @@ fn file_error(path: &Path, message: impl Into<String>) -> VideoError {
     }
 }
 
-fn read_picture(path: &Path) -> Result<VideoFrame, VideoError> {
-    let (photo, warnings) = Photo::read(path).map_err(|problem| file_error(path, problem))?;
-    Ok(VideoFrame {
+fn take_picture(path: &Path) -> Taken {
+    let frame = |photo, warnings| VideoFrame {
         photo,
         pixels: Pixels::File(path.into()),
         warnings,
-    })
+    };
+    match Photo::read(path) {
+        Ok((photo, warnings)) => Taken::Whole(frame(photo, warnings)),
+        Err(problem) => {
+            let bytes = read_file(path, MAX_PICTURE_BYTES).unwrap_or_default();
+            Taken::Damaged {
+                problem: file_error(path, problem),
+                rest: Photo::decode_cut(&bytes).map(|photo| frame(photo, Vec::new())),
+            }
+        }
+    }
 }
 
-/// The pictures of a folder, by the numbers at the ends of their names, or by name where one has none.
+/// The pictures of a folder in the order that [`Naming`] finds.
 fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
     let unreadable = |error: std::io::Error| {
         file_error(
@@ -191,7 +244,7 @@ fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
             format!("it cannot be read ({error}); expected a folder of frames; correct the rights"),
         )
     };
-    let mut pictures = Vec::new();
+    let (mut pictures, mut folders) = (Vec::new(), Vec::new());
     files::input(folder).map_err(unreadable)?;
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
@@ -200,6 +253,9 @@ fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
             .and_then(|e| e.to_str().map(|e| EXTENSIONS.contains(&e)))
             .unwrap_or(false);
         let name = path.file_name().unwrap_or_default();
+        if path.is_dir() {
+            folders.push(name.to_string_lossy().into_owned());
+        }
         if !is_picture || name.as_encoded_bytes().starts_with(b".") {
             continue;
         }
@@ -211,44 +267,54 @@ fn list(folder: &Path) -> Result<Vec<(FrameName, PathBuf)>, VideoError> {
         pictures.push((name.to_owned(), path));
     }
     if pictures.is_empty() {
-        return Err(file_error(
-            folder,
-            "it holds no picture; expected frames as PNG, JPEG, EXR or HDR; name another folder",
-        ));
+        folders.sort();
+        return Err(file_error(folder, nothing_there(&folders)));
     }
-    pictures.sort();
-    let numbers: Option<Vec<u32>> = pictures
-        .iter()
-        .map(|(name, _)| trailing_number(name))
-        .collect();
-    let mut named: Vec<(FrameName, PathBuf)> = pictures
-        .into_iter()
-        .enumerate()
-        .map(|(index, (name, path))| {
-            let number = numbers
-                .as_ref()
-                .map_or(index as u32, |numbers| numbers[index]);
-            let name = FrameName {
-                label: name.clone(),
-                file: Some(name),
-                number,
+    let naming = Naming::of(pictures.iter().map(|(name, _)| name.as_str()));
+    naming.sort(&mut pictures);
+    let above = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    let named: Vec<(FrameName, PathBuf)> = (0..)
+        .zip(pictures)
+        .map(|(place, (name, path))| {
+            let file = above.join(&name).to_string_lossy().replace('\\', "/");
+            let frame = FrameName {
+                file: Some(file),
+                number: naming.number(&name).unwrap_or(place),
+                place,
+                time_secs: naming.time_secs(&name),
+                label: name,
             };
-            (name, path)
+            (frame, path)
         })
         .collect();
-    named.sort_by_key(|(name, _)| name.number);
     for pair in named.windows(2) {
-        if pair[0].0.number == pair[1].0.number {
+        let [(a, a_path), (b, b_path)] = pair else {
+            continue;
+        };
+        let same_time = a.time_secs.is_some() && a.time_secs == b.time_secs;
+        if a.number == b.number || same_time || a_path.file_stem() == b_path.file_stem() {
             return Err(file_error(
                 folder,
                 format!(
-                    "{} and {} have one number; expected a number of its own at the end of each name; move one away",
-                    pair[0].0.label, pair[1].0.label
+                    "{} and {} have one number; expected a number or a name of its own for each frame; move one away",
+                    a.label, b.label
                 ),
             ));
         }
     }
     Ok(named)
+}
+
+/// Frames of several cameras are several sequences.
+fn nothing_there(folders: &[String]) -> String {
+    let expected = "expected frames as PNG, JPEG, EXR or HDR";
+    match folders {
+        [] => format!("it holds no picture; {expected}; name another folder"),
+        _ => format!(
+            "it holds no picture but the folders {}; {expected}, of one camera; name one of them",
+            folders.join(", ")
+        ),
+    }
 }
 
 fn open_file(path: &Path) -> Result<Kind, VideoError> {

@@ -4,6 +4,7 @@
 
 use std::io::Read;
 
+use super::matrix::Matrix;
 use super::{Place, VideoError};
 use crate::decode::{check_size, ensure_memory};
 use crate::refusal::Refusal;
@@ -41,6 +42,8 @@ pub struct Header {
     pub chroma: Chroma,
     /// Luma 0 to 255 in place of 16 to 235.
     pub full_range: bool,
+    /// By the height, unless the caller knows better.
+    pub matrix: Matrix,
     /// Frames a second as a fraction, where the stream says.
     pub rate: Option<(u32, u32)>,
     /// The line as it was read or is written, without its end.
@@ -64,6 +67,7 @@ impl Header {
             height,
             chroma: Chroma::C444,
             full_range: false,
+            matrix: Matrix::of_height(height),
             rate,
             line: format!(
                 "YUV4MPEG2 W{width} H{height} F{num}:{den} Ip A1:1 C444 XCOLORRANGE=LIMITED"
@@ -73,7 +77,7 @@ impl Header {
 
     /// Parses the first line of a stream: "problem; expected ...; how to mend".
     pub fn parse(line: &str) -> Result<Self, Refusal> {
-        let Some(rest) = line.strip_prefix("YUV4MPEG2") else {
+        let Some(rest) = line.strip_prefix(MAGIC) else {
             return Err("it does not begin with YUV4MPEG2; expected a Y4M stream; make one with `ffmpeg -i VIDEO -pix_fmt yuv420p -f yuv4mpegpipe -`".into());
         };
         let (mut width, mut height, mut rate) = (None, None, None);
@@ -123,9 +127,16 @@ impl Header {
             height,
             chroma,
             full_range,
+            matrix: Matrix::of_height(height),
             rate,
             line: line.to_owned(),
         })
+    }
+
+    /// "BT.601, limited range".
+    pub fn colours(&self) -> String {
+        let range = if self.full_range { "full" } else { "limited" };
+        format!("{}, {range} range", self.matrix.name())
     }
 
     pub fn frames_per_second(&self) -> Option<f64> {
@@ -152,12 +163,26 @@ fn parse_rate(value: &str) -> Option<(u32, u32)> {
     (num > 0 && den > 0).then_some((num, den))
 }
 
+const MAGIC: &str = "YUV4MPEG2";
+const MARKER: &str = "FRAME";
+/// What stands for a lost sample.
+pub(super) const GREY: u8 = 128;
+
 /// The longest line that a stream may have, bytes.
 const MAX_LINE: usize = 4096;
+
+/// Of one frame, one plane after the other.
+pub(crate) struct Planes {
+    pub planes: Vec<u8>,
+    /// Bytes of it are lost; what is lost is grey.
+    pub problem: Option<VideoError>,
+}
 
 /// Reads a stream frame by frame.
 pub struct Y4mReader<R> {
     input: R,
+    /// Read beyond the last frame, before `input`.
+    ahead: Vec<u8>,
     place: Place,
     header: Header,
     /// Frames read or skipped.
@@ -166,14 +191,31 @@ pub struct Y4mReader<R> {
 
 impl<R: Read> Y4mReader<R> {
     pub(crate) fn new(mut input: R, place: Place) -> Result<Self, VideoError> {
-        let line = read_line(&mut input, &place)?.ok_or_else(|| {
+        let mut begin = Vec::new();
+        (&mut input)
+            .take(LONGEST_SIGN)
+            .read_to_end(&mut begin)
+            .map_err(|error| {
+                place.error(format!(
+                    "it cannot be read ({error}); expected a Y4M stream; check where it comes from"
+                ))
+            })?;
+        if let Some(kind) = kind_of_film(&begin) {
+            return Err(place.error(format!(
+                "it is {kind}, no Y4M stream; expected frames without compression; convert it with `ffmpeg -i VIDEO -pix_fmt yuv420p -f yuv4mpegpipe -`"
+            )));
+        }
+        let mut input_from_start = begin.as_slice().chain(&mut input);
+        let line = read_line(&mut input_from_start, &place)?.ok_or_else(|| {
             place.error("it is empty; expected a Y4M stream; make one with `ffmpeg -i VIDEO -pix_fmt yuv420p -f yuv4mpegpipe -`")
         })?;
         let header = Header::parse(&line).map_err(|problem| place.error(problem))?;
+        let ahead = input_from_start.into_inner().0.to_vec();
         Ok(Self {
             input,
             place,
             header,
+            ahead,
             frames: 0,
         })
     }
@@ -182,20 +224,26 @@ impl<R: Read> Y4mReader<R> {
         &self.header
     }
 
+    pub(crate) fn set_matrix(&mut self, matrix: Matrix) {
+        self.header.matrix = matrix;
+    }
+
     pub(crate) fn place(&self) -> &Place {
         &self.place
     }
 
-    /// The planes of the next frame, one after the other; `None` at the end of the stream.
+    /// The planes of the next frame; `None` at the end of the stream. A frame is whole if another or the end follows it.
     ///
     /// # Errors
-    /// The stream ends in the middle of a frame, or another one of other frames begins.
-    pub fn next_frame(&mut self) -> Result<Option<Vec<u8>>, VideoError> {
+    /// The stream cannot be read, or another one of other frames begins.
+    pub(crate) fn next_frame(&mut self) -> Result<Option<Planes>, VideoError> {
         let number = self.frames;
-        let Some(line) = read_line(&mut self.input, &self.place)? else {
+        let ahead = std::mem::take(&mut self.ahead);
+        let mut input = ahead.as_slice().chain(&mut self.input);
+        let Some(line) = read_line(&mut input, &self.place)? else {
             return Ok(None);
         };
-        if let Some(rest) = line.strip_prefix("YUV4MPEG2") {
+        if let Some(rest) = line.strip_prefix(MAGIC) {
             return Err(self.place.error(format!(
                 "another stream begins at frame {number} ({}); expected frames of one size, {} x {}; scale and join the parts first",
                 rest.trim(),
@@ -203,29 +251,76 @@ impl<R: Read> Y4mReader<R> {
                 self.header.height
             )));
         }
-        if line != "FRAME" && !line.starts_with("FRAME ") {
+        if line != MARKER && !line.starts_with("FRAME ") {
             return Err(self.place.error(format!(
                 "frame {number} does not begin with FRAME; expected a whole Y4M stream; make it again"
             )));
         }
         let wanted = self.header.frame_bytes();
-        let mut planes = Vec::with_capacity(wanted);
-        let read = (&mut self.input)
-            .take(wanted as u64)
-            .read_to_end(&mut planes);
-        read.map_err(|error| {
+        let unreadable = |error: std::io::Error| {
             self.place.error(format!(
                 "it cannot be read ({error}); expected a Y4M stream; check where it comes from"
             ))
-        })?;
-        if planes.len() < wanted {
-            return Err(self.place.error(format!(
-                "it is truncated: frame {number} has {} of {wanted} bytes; expected whole frames; make the stream again, then go on with the same command",
-                planes.len()
-            )));
-        }
+        };
+        let mut planes = Vec::with_capacity(wanted);
+        let mut read = |count: usize, bytes: &mut Vec<u8>| {
+            (&mut input)
+                .take(count as u64)
+                .read_to_end(bytes)
+                .map_err(unreadable)
+        };
+        read(wanted, &mut planes)?;
+        let mut next = Vec::new();
+        read(MARKER.len(), &mut next)?;
         self.frames += 1;
-        Ok(Some(planes))
+        let lost = |there: usize| {
+            format!(
+                "it is truncated: frame {number} has {there} of {wanted} bytes; expected whole frames; make the stream again, or let such frames pass with --damaged-frames pass; then go on with the same command"
+            )
+        };
+        if planes.len() < wanted {
+            let problem = Some(self.place.error(lost(planes.len())));
+            planes.resize(wanted, GREY);
+            return Ok(Some(Planes { planes, problem }));
+        }
+        if next.is_empty() || next == MARKER.as_bytes() || MAGIC.as_bytes().starts_with(&next) {
+            self.ahead = next;
+            return Ok(Some(Planes {
+                planes,
+                problem: None,
+            }));
+        }
+        // The next frame began before this one was full, or further on.
+        let begins = |bytes: &[u8]| {
+            let mut pairs = bytes.windows(MARKER.len() + 1);
+            pairs.position(|at| at.starts_with(MARKER.as_bytes()) && b"\n ".contains(&at[5]))
+        };
+        let there = begins(&planes).unwrap_or(wanted);
+        let mut rest = [&planes[there..], &next].concat();
+        while there == wanted && begins(&rest).is_none() && read(wanted, &mut rest)? > 0 {}
+        self.ahead = rest.split_off(begins(&rest).unwrap_or(rest.len()));
+        planes[there..].fill(GREY);
+        let problem = Some(self.place.error(lost(there)));
+        Ok(Some(Planes { planes, problem }))
+    }
+}
+
+/// How many bytes tell the kinds of films apart.
+const LONGEST_SIGN: u64 = 12;
+
+/// Of files of other programs that hold films.
+fn kind_of_film(begin: &[u8]) -> Option<&'static str> {
+    match begin {
+        [_, _, _, _, b'f', b't', b'y', b'p', ..] | [_, _, _, _, b'm', b'o', b'o', b'v', ..] => {
+            Some("an MP4 or QuickTime film")
+        }
+        [0x1a, 0x45, 0xdf, 0xa3, ..] => Some("a Matroska or WebM film"),
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'A', b'V', b'I', ..] => Some("an AVI film"),
+        [b'O', b'g', b'g', b'S', ..] => Some("an Ogg film"),
+        [b'F', b'L', b'V', ..] => Some("a Flash film"),
+        [b'G', b'I', b'F', b'8', ..] => Some("a GIF"),
+        [0x00, 0x00, 0x00, 0x01, ..] | [0x00, 0x00, 0x01, ..] => Some("an MPEG or H.264 stream"),
+        _ => None,
     }
 }
 

@@ -1,4 +1,4 @@
-//! Y'CbCr of BT.601 to encoded RGB and back.
+//! Y'CbCr of BT.601 or BT.709 to encoded RGB and back.
 //!
 //! Limited range: luma 16 to 235, colour 16 to 240; full range where the stream says so. A colour sample belongs to all pixels of its block
 //! alike, so that a pixel that nothing changed keeps its luma and its share of the colour, and a block that nothing changed its bytes.
@@ -6,11 +6,10 @@
 
 use super::y4m::Header;
 
-/// Weights of red and blue in luma.
-const RED: f64 = 0.299;
-const BLUE: f64 = 0.114;
-
 struct Range {
+    /// Weights of red and blue in luma.
+    red: f64,
+    blue: f64,
     luma_zero: f64,
     luma_span: f64,
     colour_span: f64,
@@ -18,13 +17,18 @@ struct Range {
 
 impl Range {
     fn of(header: &Header) -> Self {
+        let (red, blue) = header.matrix.weights();
         match header.full_range {
             true => Self {
+                red,
+                blue,
                 luma_zero: 0.0,
                 luma_span: 255.0,
                 colour_span: 255.0,
             },
             false => Self {
+                red,
+                blue,
                 luma_zero: 16.0,
                 luma_span: 219.0,
                 colour_span: 224.0,
@@ -36,18 +40,18 @@ impl Range {
         let luma = (f64::from(y) - self.luma_zero) / self.luma_span;
         let cb = (f64::from(cb) - 128.0) / self.colour_span;
         let cr = (f64::from(cr) - 128.0) / self.colour_span;
-        let red = luma + 2.0 * (1.0 - RED) * cr;
-        let blue = luma + 2.0 * (1.0 - BLUE) * cb;
-        let green = (luma - RED * red - BLUE * blue) / (1.0 - RED - BLUE);
+        let red = luma + 2.0 * (1.0 - self.red) * cr;
+        let blue = luma + 2.0 * (1.0 - self.blue) * cb;
+        let green = (luma - self.red * red - self.blue * blue) / (1.0 - self.red - self.blue);
         [red, green, blue].map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8)
     }
 
     /// Unrounded codes.
     fn encode(&self, rgb: [u8; 3]) -> [f64; 3] {
         let [red, green, blue] = rgb.map(|x| f64::from(x) / 255.0);
-        let luma = RED * red + (1.0 - RED - BLUE) * green + BLUE * blue;
-        let cb = (blue - luma) / (2.0 * (1.0 - BLUE));
-        let cr = (red - luma) / (2.0 * (1.0 - RED));
+        let luma = self.red * red + (1.0 - self.red - self.blue) * green + self.blue * blue;
+        let cb = (blue - luma) / (2.0 * (1.0 - self.blue));
+        let cr = (red - luma) / (2.0 * (1.0 - self.red));
         [
             self.luma_zero + self.luma_span * luma,
             128.0 + self.colour_span * cb,
@@ -119,6 +123,7 @@ pub fn encode_yuv(
 
 #[cfg(test)]
 mod tests {
+    use super::super::matrix::Matrix;
     use super::*;
 
     fn header_of(chroma: &str, more: &str) -> Header {
@@ -152,6 +157,31 @@ mod tests {
             full.encode([255; 3]).map(code),
             [255, 128, 128],
             "control: another range"
+        );
+    }
+
+    /// ITU-R BT.709's primaries and white at 100 percent, limited range.
+    #[test]
+    fn high_definition_has_its_own_weights() {
+        let mut header = header_of("444", "");
+        let red = |header: &Header| Range::of(header).encode([255, 0, 0]).map(code);
+        assert_eq!(red(&header), [81, 90, 240], "control");
+        header.matrix = Matrix::Bt709;
+        assert_eq!(red(&header), [63, 102, 240]);
+        let range = Range::of(&header);
+        assert_eq!(range.encode([0, 255, 0]).map(code), [173, 42, 26]);
+        assert_eq!(range.encode([255; 3]).map(code), [235, 128, 128]);
+        for rgb in [[244, 89, 89], [0, 0, 255], [10, 200, 30]] {
+            let back = range.decode(range.encode(rgb).map(code));
+            assert!(
+                rgb.iter().zip(back).all(|(a, b)| a.abs_diff(b) <= 2),
+                "{back:?}"
+            );
+        }
+        let tall = Header::parse("YUV4MPEG2 W1280 H720").expect("parses");
+        assert_eq!(
+            (tall.matrix, header_of("420", "").matrix),
+            (Matrix::Bt709, Matrix::Bt601)
         );
     }
 

@@ -33,7 +33,8 @@ pub fn renderer(scene: Scene, all_planes: bool) -> Renderer {
 
 pub fn renderer_without(scene: Scene, all_planes: bool, without: Without) -> Renderer {
     let options = RendererOptions {
-        all_planes,
+        guides: all_planes,
+        real_everywhere: all_planes,
         without,
         ..RendererOptions::default()
     };

@@ -73,6 +73,7 @@ pub fn photo_of(width: u32, height: u32, linear: Vec<[f32; 3]>) -> Photo {
         height,
         linear,
         encoded: EncodedPhoto::Linear,
+        tags: Default::default(),
     }
 }
 

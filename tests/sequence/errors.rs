@@ -110,7 +110,7 @@ fn broken_streams_say_where() {
         "what was whole is rendered"
     );
     assert_refused(&run(b""), "it is empty");
-    assert_refused(&run(b"RIFF"), "truncated in the middle of a line");
+    assert_refused(&run(b"YUV4"), "truncated in the middle of a line");
     assert_refused(&run(b"RIFF\n"), "begin with YUV4MPEG2");
     let two: Vec<u8> = [y4m(48, 36, 1), y4m(40, 36, 1)].concat();
     assert_refused(&run(&two), "another stream begins at frame 1");

@@ -176,11 +176,7 @@ fn known_points_of_the_webcam_videos_are_where_the_poses_put_them() {
         let mut table = String::from("frame,x_px,y_px,x_m,y_m,z_m\n");
         let mut frames = 0;
         for number in 0..trajectory.entries.len() as u32 {
-            let name = FrameName {
-                label: String::new(),
-                file: None,
-                number,
-            };
+            let name = FrameName::of_stream(number, "video");
             let view = views.of(&name).expect("is there");
             frames += u32::from(view.world_from_camera.is_some());
             for (x, z) in [(0.0, 0.0), (0.075, 0.045), (-0.06, 0.03)] {

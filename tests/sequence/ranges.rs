@@ -102,7 +102,8 @@ fn kinds() -> Vec<Kind> {
 fn renderer(scene: &Scene, range: (u32, u32), all_planes: bool) -> Renderer {
     let options = RendererOptions {
         sample_range: Some(range),
-        all_planes,
+        guides: all_planes,
+        real_everywhere: all_planes,
         ..RendererOptions::default()
     };
     Renderer::new(scene.clone(), options, &Watcher::none()).expect("fits")

@@ -238,6 +238,7 @@ pub(super) fn nothing_virtual(backend: &mut Backend, at: At) -> Result<Measured,
             .map(|i| [0.0, 0.37, 0.61].map(|c| (c + 0.001 * i as f32).fract()))
             .collect(),
         encoded: EncodedPhoto::Linear,
+        tags: Default::default(),
     });
     if !at.control {
         scene

@@ -2,7 +2,7 @@
 
 use super::super::chi_squared::{assert_uniform, critical, statistic};
 use super::*;
-use crate::distortion;
+use crate::distortion::{self, Distortion};
 use crate::math::{hash_u32, uniform_from_bits};
 use crate::pack::camera::frame_camera;
 use crate::scene::projection::{LensError, check_distortion, project, undistort};
@@ -10,6 +10,10 @@ use crate::scene::{Aperture, Camera, Lens};
 use glam::{DMat4, DVec3};
 
 fn camera(distortion: [f64; 5]) -> Camera {
+    camera_with(Distortion::opencv(&distortion).expect("five"))
+}
+
+fn camera_with(distortion: Distortion) -> Camera {
     let rotation = DMat4::from_rotation_y(0.7) * DMat4::from_rotation_x(-0.3);
     Camera {
         width: 640,
@@ -340,7 +344,8 @@ fn distortion_follows_opencv() {
         0.3 * radial + 2.0 * 0.003 * -0.06 - 0.004 * (0.13 + 0.18),
         -0.2 * radial + 0.003 * (0.13 + 0.08) + 2.0 * -0.004 * -0.06,
     ];
-    let found = distortion::distort(&k, [0.3, -0.2]);
+    let lens = Distortion::opencv(&k).expect("five");
+    let found = distortion::distort(lens.model, &lens.coefficients, [0.3, -0.2]);
     assert!((found[0] - want[0]).abs() < 1e-15 && (found[1] - want[1]).abs() < 1e-15);
 }
 

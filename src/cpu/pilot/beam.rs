@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::camera::lens::{camera_ray_from, lens_undistort};
+use crate::camera::lens::{camera_ray_from, is_wide, lens_undistort};
 use crate::camera::shutter::{CameraPose, camera_pose, camera_pose_at};
 use crate::packed::{FRAME_SHUTTER, Frame, PackedScene, SHUTTER_POSES};
 
@@ -19,12 +19,19 @@ pub struct Beam {
     inv_focus_distance: f32,
     /// How far the camera moves from where it is in the middle of the row's exposure, metres.
     shake: f32,
+    /// Of a fisheye without an aperture, whose rays may look back: the half-angle of the cone that holds them, radians.
+    cone: Option<f32>,
 }
 
 /// Rounding and the curvature of the distortion inside one pixel.
 const FOOTPRINT_MARGIN: f32 = 1.1;
 /// A square of half-width 1 reaches this far.
 const SQUARE_REACH: f32 = std::f32::consts::SQRT_2;
+
+/// Of unit vectors, radians; precise where it is small.
+fn angle_between(a: Vec3, b: Vec3) -> f32 {
+    a.cross(b).length().atan2(a.dot(b))
+}
 
 /// Where the camera is in the middle, at the ends and at the corners of its way while a row is exposed.
 struct RowPoses {
@@ -73,13 +80,24 @@ impl Beam {
             // What a step of the camera does to the ray at a given depth, and what the lens's plane does that turns with it.
             let step = pose.position.distance(middle.position);
             let turn = 2.0 * frame.aperture_radius * pose.back.distance(middle.back);
-            for ideal in corners {
+            for ideal in corners.iter().filter(|_| !is_wide(frame)) {
                 let direction =
                     at_depth_1(pose.right * ideal[0] - (pose.up * ideal[1] + pose.back));
                 footprint = footprint.max(direction.distance(ahead));
                 shake = shake.max((step + turn) * (1.0 + direction.length()));
             }
         }
+        let cone = is_wide(frame).then(|| {
+            let mut half_angle = 0.0f32;
+            for pose in &poses.all[..poses.count] {
+                shake = shake.max(pose.position.distance(middle.position));
+                for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+                    let ray = camera_ray_from(pinhole, pose, x + dx, y + dy, 0.5, 0.5);
+                    half_angle = half_angle.max(angle_between(ray.direction, centre.direction));
+                }
+            }
+            half_angle * FOOTPRINT_MARGIN
+        });
         Self {
             origin: centre.origin,
             direction: centre.direction,
@@ -88,6 +106,7 @@ impl Beam {
             aperture_radius: frame.aperture_radius * SQUARE_REACH,
             inv_focus_distance: frame.inv_focus_distance,
             shake: shake * FOOTPRINT_MARGIN,
+            cone,
         }
     }
 
@@ -103,6 +122,14 @@ impl Beam {
 
     fn may_meet_sphere(&self, centre: Vec3, radius: f32) -> bool {
         let to = centre - self.origin;
+        if let Some(half_angle) = self.cone {
+            let reach = (radius + self.shake) * 1.001;
+            let distance = to.length();
+            return distance <= reach || {
+                let wide = half_angle + (reach / distance).asin();
+                angle_between(to / distance, self.direction) <= wide * 1.001 + 1e-4
+            };
+        }
         let z = to.dot(self.axis);
         if z + radius < 0.0 {
             return false;
@@ -125,6 +152,72 @@ impl Beam {
         match scene.real_bvh.bounds() {
             None => false,
             Some((lo, hi)) => self.may_meet_sphere((lo + hi) * 0.5, (hi - lo).length() * 0.5),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::distortion::Distortion;
+    use crate::math::{hash_u32, uniform_from_bits};
+    use crate::pack::camera::frame_camera;
+    use crate::scene::{Camera, Lens};
+    use bytemuck::Zeroable;
+    use glam::{DMat4, DVec3};
+
+    fn frame(aperture_radius_m: f64) -> Frame {
+        let camera = Camera {
+            width: 64,
+            height: 48,
+            fx: 27.0,
+            fy: 27.0,
+            cx: 32.0,
+            cy: 24.0,
+            distortion: Distortion::fisheye([0.02, -0.003, 0.0, 0.0]),
+            world_from_camera: DMat4::IDENTITY,
+        };
+        let lens = Lens {
+            aperture_radius_m,
+            focus_distance_m: 1.5,
+            ..Lens::PINHOLE
+        };
+        let mut frame = Frame::zeroed();
+        frame_camera(&camera, &lens, DVec3::ZERO, &mut frame);
+        frame
+    }
+
+    /// Of pixels that are wide in angle and end 85 degrees off the axis.
+    #[test]
+    fn rays_of_a_fisheyes_pixel_stay_in_its_beam() {
+        let random = |i: u32| uniform_from_bits(hash_u32(i));
+        for aperture_radius_m in [0.0, 0.02] {
+            let (frame, pinhole) = (frame(aperture_radius_m), frame(0.0));
+            let (mut worst, mut control) = (0.0f32, 0.0f32);
+            for i in 0..20_000 {
+                let pixel = hash_u32(i) % (64 * 48);
+                let beam = Beam::of_pixel(&frame, &pinhole, pixel);
+                let (x, y) = ((pixel % 64) as f32, (pixel / 64) as f32);
+                let [dx, dy, u, v] = [1, 2, 3, 4].map(|n| random(4 * i + n));
+                let ray = camera_ray_from(&frame, &camera_pose(&frame), x + dx, y + dy, u, v);
+                let depth = 0.1 + 5.0 * random(i + 77);
+                let at = |origin: Vec3, direction: Vec3| {
+                    origin
+                        + direction * ((depth - origin.dot(beam.axis)) / direction.dot(beam.axis))
+                };
+                let (off, bound) = match beam.cone {
+                    Some(half_angle) => (angle_between(ray.direction, beam.direction), half_angle),
+                    None => {
+                        let off = at(ray.origin, ray.direction);
+                        let off = off.distance(at(beam.origin, beam.direction));
+                        (off, beam.radius(depth, depth))
+                    }
+                };
+                worst = worst.max(off / bound);
+                control = control.max(off / (0.5 * bound));
+            }
+            assert!(worst <= 1.0, "{worst}");
+            assert!(control > 1.0, "control: half the radius is too little");
         }
     }
 }

@@ -75,6 +75,7 @@ fn photo(ic: f32) -> Photo {
         height: 1,
         linear: vec![[ic; 3]],
         encoded: crate::scene::EncodedPhoto::Linear,
+        tags: Default::default(),
     }
 }
 

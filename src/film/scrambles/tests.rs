@@ -11,6 +11,7 @@ fn photo() -> Photo {
         height: 1,
         linear: vec![[IC; 3]],
         encoded: crate::scene::EncodedPhoto::Linear,
+        tags: Default::default(),
     }
 }
 

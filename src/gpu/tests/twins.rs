@@ -41,7 +41,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("camera::lens", "xyz", "WGSL writes v.xyz"),
     (
         "distortion",
-        "is_regular newton undistort",
+        "sqrt atan opencv fisheye is_none is_regular newton undistort fisheye_angle",
         "the proof, in f64, when a scene is read",
     ),
     (

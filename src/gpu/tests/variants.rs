@@ -194,6 +194,15 @@ const TRACES: &[Trace] = &[
         ..ADVANCE
     },
     Trace {
+        feature: "lens_models",
+        kernel: "kernel_generate",
+        with: &[
+            "fn distortion__fisheye_direction",
+            "fn distortion__rational_jacobian",
+        ],
+        ..ADVANCE
+    },
+    Trace {
         feature: "multi_bounce",
         with: &[
             "cpu_vertex__ROULETTE_GAIN",

@@ -43,7 +43,8 @@ fn every_layer_and_attribute_reads_back() {
             fy: 521.0,
             cx: 1.5,
             cy: 1.0,
-            distortion: [0.1, 0.0, 0.0, 0.0, -0.2],
+            distortion: crate::scene::Distortion::opencv(&[0.1, 0.0, 0.0, 0.0, -0.2])
+                .expect("five"),
             world_from_camera,
         },
     };
@@ -175,7 +176,7 @@ fn planes_that_were_not_asked_for_are_left_out() {
             fy: 1.0,
             cx: 1.5,
             cy: 1.0,
-            distortion: [0.0; 5],
+            distortion: crate::scene::Distortion::NONE,
             world_from_camera: glam::DMat4::IDENTITY,
         },
     };

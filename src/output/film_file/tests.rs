@@ -66,7 +66,7 @@ fn written(film: &Film) -> (tempfile::TempDir, Target) {
             fy: 1.0,
             cx: 1.5,
             cy: 1.0,
-            distortion: [0.0; 5],
+            distortion: crate::scene::Distortion::NONE,
             world_from_camera: glam::DMat4::IDENTITY,
         },
     };

@@ -53,6 +53,7 @@ fn scene() -> (Scene, Photo) {
         height: 32,
         linear,
         encoded: EncodedPhoto::Linear,
+        tags: Default::default(),
     };
     (scene, photo)
 }

@@ -29,6 +29,7 @@ impl Scene {
             composite: _,
             combine: _,
             backend: _,
+            upright_photo: _,
         } = &self.settings;
         let Self {
             name: _,

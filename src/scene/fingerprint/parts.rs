@@ -2,15 +2,17 @@
 
 use super::{Content, ContentHash, content, content_by_name};
 use crate::scene::animation::{AnimatedNode, Animation, InstanceAnimation, Interpolation, Track};
-use crate::scene::trajectory::{Entry, EntryKey, Intrinsics};
+use crate::scene::deformation::{DeformableMesh, Deformation, Joint, MorphTarget, Skin};
+use crate::scene::trajectory::{Entry, EntryKey, Focal, Intrinsics};
 use crate::scene::{
-    AlphaMode, Aperture, Backdrop, BackendChoice, Camera, Combine, Composite, Environment,
-    EnvironmentMap, Estimator, Exposure, Instance, Lens, Light, LightKind, MotionKey, Object,
-    Photo, Primitive, SamplerKind, Settings, Shutter, Side, Texture, TextureRef, Wrap,
+    AlphaMode, Aperture, Backdrop, BackendChoice, Camera, Combine, Composite, Distortion,
+    Environment, EnvironmentMap, Estimator, Exposure, Instance, Lens, Light, LightKind, MotionKey,
+    Object, Photo, Primitive, SamplerKind, Settings, Shutter, Side, Texture, TextureRef, Wrap,
 };
 
 content! {
-    Photo { width, height, linear; encoded }
+    Photo { width, height, linear; encoded, tags }
+    Distortion { model, coefficients }
     Camera { width, height, fx, fy, cx, cy, distortion, world_from_camera }
     Lens { aperture_radius_m, focus_distance_m, aperture, blade_rotation_deg }
     Shutter { exposure_secs, readout_secs, samples, time_secs }
@@ -19,20 +21,25 @@ content! {
     Light { kind, side }
 
     Object { side, world_from_object, motion, instances, self_shadow_bias_m, albedo_from_photo; name }
-    Instance { object_from_local, animation, primitive, material }
+    Instance { object_from_local, animation, deformation, primitive, material }
+    Deformation { mesh, weights, skin, animation, node }
+    DeformableMesh { base, is_flat, targets, influences }
+    MorphTarget { positions, normals, tangents }
+    Skin { joints }
+    Joint { node, inverse_bind }
     Primitive { positions, normals, tangents, uvs, colors, triangles; name }
     MotionKey { time_secs, translation, rotation, scale }
-    InstanceAnimation { animation, node }
+    InstanceAnimation { animation, node, node_from_local }
     Animation { nodes, duration_secs }
-    AnimatedNode { parent, rest, translation, rotation, scale }
+    AnimatedNode { parent, rest, translation, rotation, scale, weights }
     Track { times, values, interpolation }
 
     TextureRef { texture, uv_set, transform }
     Texture { width, height, rgba8, wrap_u, wrap_v, nearest; name }
 
-    Settings { rays_per_pixel, max_bounces, clamp_indirect, seed, estimator, sampler, composite, combine, backend, exposure, backdrop, multiple_scattering }
+    Settings { rays_per_pixel, max_bounces, clamp_indirect, seed, estimator, sampler, composite, combine, backend, exposure, backdrop, multiple_scattering, upright_photo }
 
-    Intrinsics { size, fx, fy, cx, cy, distortion }
+    Intrinsics { size, focal, centre, distortion }
     Entry { key, time_secs, world_from_camera, intrinsics, focus_distance_m; place }
 }
 
@@ -72,5 +79,6 @@ content_of_variants! {
     Interpolation { Step, Linear, Cubic }
     Exposure { Ev(ev), Auto }
     Backdrop { Environment, Photograph(distance_m) }
-    EntryKey { Number(number), Name(name), Time }
+    Focal { Pixels(focal), FieldOfView(angle) }
+    EntryKey { Number(number), Name(name), Order(place) }
 }

@@ -41,8 +41,13 @@ pub(super) fn read(document: &Document, wanted: &str) -> Result<Animation, Probl
             Checked::Valid(file::Property::Translation) => (&mut node.translation, 3),
             Checked::Valid(file::Property::Scale) => (&mut node.scale, 3),
             Checked::Valid(file::Property::Rotation) => (&mut node.rotation, 4),
-            // Morph targets are not applied.
-            Checked::Valid(file::Property::MorphTargetWeights) => continue,
+            Checked::Valid(file::Property::MorphTargetWeights) => {
+                node.weights = read_weights(document, sampler, &at)?;
+                for track in &node.weights {
+                    duration_secs = duration_secs.max(track.times[track.times.len() - 1]);
+                }
+                continue;
+            }
             Checked::Invalid => return Err(malformed(&at, "moves a property that is not known")),
         };
         let track = read_track(document, sampler, &at, components)?;
@@ -55,6 +60,14 @@ pub(super) fn read(document: &Document, wanted: &str) -> Result<Animation, Probl
     })
 }
 
+/// All nodes where the file puts them.
+pub(super) fn at_rest(document: &Document) -> Result<Animation, Problem> {
+    Ok(Animation {
+        nodes: still_nodes(document)?,
+        duration_secs: 0.0,
+    })
+}
+
 fn still_nodes(document: &Document) -> Result<Vec<AnimatedNode>, Problem> {
     let mut nodes = (document.nodes.iter().enumerate())
         .map(|(index, node)| {
@@ -64,6 +77,7 @@ fn still_nodes(document: &Document) -> Result<Vec<AnimatedNode>, Problem> {
                 translation: None,
                 rotation: None,
                 scale: None,
+                weights: Vec::new(),
             })
         })
         .collect::<Result<Vec<_>, Problem>>()?;
@@ -84,24 +98,8 @@ fn read_track(
     at: &str,
     components: usize,
 ) -> Result<Track, Problem> {
-    let interpolation = match sampler.interpolation {
-        Checked::Valid(file::Interpolation::Step) => Interpolation::Step,
-        Checked::Valid(file::Interpolation::Linear) => Interpolation::Linear,
-        Checked::Valid(file::Interpolation::CubicSpline) => Interpolation::Cubic,
-        Checked::Invalid => return Err(malformed(at, "has an unknown interpolation")),
-    };
-    let times: Vec<f64> = (document
-        .vectors::<1>(sampler.input.value(), at, 1, false)?
-        .iter())
-    .map(|[time]| f64::from(*time))
-    .collect();
-    let rising = times.windows(2).all(|pair| pair[0] < pair[1]);
-    if times.is_empty() || !rising || !times.iter().all(|t| t.is_finite() && *t >= 0.0) {
-        return Err(malformed(
-            at,
-            "its times are not finite, rising and at least 0",
-        ));
-    }
+    let interpolation = interpolation_of(sampler, at)?;
+    let times = read_times(document, sampler, at)?;
     let vectors = document.vectors::<4>(sampler.output.value(), at, components, components == 4)?;
     let values: Vec<DVec4> = vectors
         .iter()
@@ -110,10 +108,7 @@ fn read_track(
             DVec4::new(x, y, z, if components == 4 { w } else { 0.0 })
         })
         .collect();
-    let each = match interpolation {
-        Interpolation::Cubic => 3,
-        _ => 1,
-    };
+    let each = keys_of(interpolation);
     if values.len() != each * times.len() {
         return Err(malformed(
             at,
@@ -137,4 +132,75 @@ fn read_track(
         values,
         interpolation,
     })
+}
+
+/// Weights of morph targets, four of them a track.
+fn read_weights(
+    document: &Document,
+    sampler: &file::Sampler,
+    at: &str,
+) -> Result<Vec<Track>, Problem> {
+    let interpolation = interpolation_of(sampler, at)?;
+    let times = read_times(document, sampler, at)?;
+    let values = document.vectors::<1>(sampler.output.value(), at, 1, false)?;
+    let rows = keys_of(interpolation) * times.len();
+    let targets = values.len() / rows;
+    if targets * rows != values.len() || !values.as_flattened().iter().all(|w| w.is_finite()) {
+        return Err(malformed(
+            at,
+            format!(
+                "has {} weights for {} times, or one that is not finite",
+                values.len(),
+                times.len()
+            ),
+        ));
+    }
+    let tracks = (0..targets).step_by(4).map(|first| {
+        let weight = |row: usize, target: usize| match target < targets {
+            true => f64::from(values[row * targets + target][0]),
+            false => 0.0,
+        };
+        let rows = 0..rows;
+        Track {
+            times: times.clone(),
+            values: rows
+                .map(|row| DVec4::from([0, 1, 2, 3].map(|i| weight(row, first + i))))
+                .collect(),
+            interpolation,
+        }
+    });
+    Ok(tracks.collect())
+}
+
+fn interpolation_of(sampler: &file::Sampler, at: &str) -> Result<Interpolation, Problem> {
+    match sampler.interpolation {
+        Checked::Valid(file::Interpolation::Step) => Ok(Interpolation::Step),
+        Checked::Valid(file::Interpolation::Linear) => Ok(Interpolation::Linear),
+        Checked::Valid(file::Interpolation::CubicSpline) => Ok(Interpolation::Cubic),
+        Checked::Invalid => Err(malformed(at, "has an unknown interpolation")),
+    }
+}
+
+/// Values a time.
+fn keys_of(interpolation: Interpolation) -> usize {
+    match interpolation {
+        Interpolation::Cubic => 3,
+        Interpolation::Step | Interpolation::Linear => 1,
+    }
+}
+
+fn read_times(document: &Document, sampler: &file::Sampler, at: &str) -> Result<Vec<f64>, Problem> {
+    let times: Vec<f64> = (document
+        .vectors::<1>(sampler.input.value(), at, 1, false)?
+        .iter())
+    .map(|[time]| f64::from(*time))
+    .collect();
+    let rising = times.windows(2).all(|pair| pair[0] < pair[1]);
+    if times.is_empty() || !rising || !times.iter().all(|t| t.is_finite() && *t >= 0.0) {
+        return Err(malformed(
+            at,
+            "its times are not finite, rising and at least 0",
+        ));
+    }
+    Ok(times)
 }

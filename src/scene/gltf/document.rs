@@ -12,6 +12,7 @@ use serde_json::Value;
 
 use super::Problem;
 use super::container::{Container, clip, file_of_uri, malformed, read_uri};
+use super::nodes::{Node, SceneNodes, SkinSource};
 
 /// Elements of an accessor that no buffer backs (all zero, or sparse over zeros): the only size a file can state without bytes.
 const MAX_UNBACKED_ELEMENTS: u64 = 1 << 24;
@@ -19,45 +20,13 @@ const MAX_UNBACKED_ELEMENTS: u64 = 1 << 24;
 /// Bytes decoded for one file: accessors may be shared, so a small file can ask for any amount.
 const MAX_DECODED_BYTES: u64 = 1 << 31;
 
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Node {
-    #[serde(default)]
-    pub children: Vec<usize>,
-    pub mesh: Option<usize>,
-    pub matrix: Option<[f64; 16]>,
-    pub translation: Option<[f64; 3]>,
-    pub rotation: Option<[f64; 4]>,
-    pub scale: Option<[f64; 3]>,
-    pub skin: Option<Value>,
-    pub weights: Option<Vec<f32>>,
-    #[serde(default)]
-    pub extensions: NodeExtensions,
-}
-
-#[derive(Default, Deserialize)]
-pub(super) struct NodeExtensions {
-    #[serde(rename = "KHR_lights_punctual")]
-    pub light: Option<NodeLight>,
-}
-
-#[derive(Deserialize)]
-pub(super) struct NodeLight {
-    pub light: usize,
-}
-
-#[derive(Deserialize)]
-pub(super) struct SceneNodes {
-    #[serde(default)]
-    pub nodes: Vec<usize>,
-}
-
 /// Transforms are read in f64, which the crate's own node type is not.
 pub(super) struct Document {
     pub scene: Option<usize>,
     pub scenes: Vec<SceneNodes>,
     pub nodes: Vec<Node>,
     pub meshes: Vec<json::Mesh>,
+    pub skins: Vec<SkinSource>,
     pub materials: Vec<json::Material>,
     pub textures: Vec<json::Texture>,
     pub samplers: Vec<json::texture::Sampler>,
@@ -98,6 +67,7 @@ impl Document {
             scenes: list(&json, "scenes")?,
             nodes: list(&json, "nodes")?,
             meshes: list(&json, "meshes")?,
+            skins: list(&json, "skins")?,
             materials: list(&json, "materials")?,
             textures: list(&json, "textures")?,
             samplers: list(&json, "samplers")?,
@@ -235,6 +205,7 @@ impl Document {
             Checked::Valid(Type::Vec2) => 2,
             Checked::Valid(Type::Vec3) => 3,
             Checked::Valid(Type::Vec4) => 4,
+            Checked::Valid(Type::Mat4) => 16,
             _ => 0,
         };
         if !(shortest..=N).contains(&components) || component == ComponentType::U32 {

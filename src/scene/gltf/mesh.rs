@@ -9,14 +9,19 @@ use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::Checked;
 
 use super::container::{clip, malformed};
+use super::deformable::read_deformable;
 use super::document::Document;
+use super::uv_sets::{self, UvSets, uv_sets};
 use super::{Note, Notes, Problem};
 use crate::scene::Primitive;
+use crate::scene::deformation::{DeformableMesh, MorphTarget};
 
 /// A primitive with the index of its material, if it names one.
 #[derive(Clone)]
 pub(super) struct DrawnPrimitive {
     pub primitive: Arc<Primitive>,
+    /// What a skin or morph targets start from; `None`: the primitive keeps its shape.
+    pub deformable: Option<Arc<DeformableMesh>>,
     pub material: Option<usize>,
 }
 
@@ -57,10 +62,17 @@ impl<'a> Meshes<'a> {
         let mut drawn = Vec::new();
         for (number, source) in mesh.primitives.iter().enumerate() {
             let name = format!("{label} / primitive {number}");
-            if let Some(primitive) = read_primitive(self.document, source, &name, notes)? {
+            let material = source.material.map(|material| material.value());
+            let sets = match material.and_then(|index| self.document.materials.get(index)) {
+                Some(material) => uv_sets(material, &name)?,
+                None => uv_sets::PLAIN,
+            };
+            let read = read_primitive(self.document, source, &name, sets, notes)?;
+            if let Some((primitive, deformable)) = read {
                 drawn.push(DrawnPrimitive {
                     primitive: Arc::new(primitive),
-                    material: source.material.map(|material| material.value()),
+                    deformable: deformable.map(Arc::new),
+                    material,
                 });
             }
         }
@@ -74,8 +86,9 @@ fn read_primitive(
     document: &Document,
     source: &json::mesh::Primitive,
     name: &str,
+    sets: UvSets,
     notes: &mut Notes,
-) -> Result<Option<Primitive>, Problem> {
+) -> Result<Option<(Primitive, Option<DeformableMesh>)>, Problem> {
     let mode = match source.mode {
         Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
         Checked::Valid(_) => {
@@ -106,16 +119,17 @@ fn read_primitive(
     if let Some(index) = attribute(Semantic::Tangents) {
         primitive.tangents = document.vectors::<4>(index, &at(name, "TANGENT"), 4, false)?;
     }
-    for set in 0..2 {
+    for (place, set) in sets.into_iter().enumerate() {
         if let Some(index) = attribute(Semantic::TexCoords(set)) {
             let at = at(name, &format!("TEXCOORD_{set}"));
-            primitive.uvs[set as usize] = document.vectors::<2>(index, &at, 2, false)?;
+            primitive.uvs[place] = document.vectors::<2>(index, &at, 2, false)?;
         }
     }
     if let Some(index) = attribute(Semantic::Colors(0)) {
         primitive.colors = document.vectors::<4>(index, &at(name, "COLOR_0"), 3, true)?;
     }
     check_attributes(&primitive)?;
+    let deformable = read_deformable(document, source, name, primitive.positions.len())?;
     let indices = match source.indices {
         Some(index) => document.indices(index.value(), &at(name, "indices"))?,
         None => (0..primitive.positions.len() as u32).collect(),
@@ -142,11 +156,38 @@ fn read_primitive(
         notes.plain(format!("{name} has no triangles and was left out"));
         return Ok(None);
     }
+    let is_flat = primitive.normals.is_empty();
+    let order: Vec<u32> = primitive.triangles.iter().flatten().copied().collect();
     finish_normals(&mut primitive, notes);
     for color in primitive.colors.iter_mut().flatten() {
         *color = color.clamp(0.0, 1.0);
     }
-    Ok(Some(primitive))
+    let deformable = deformable.map(|mesh| DeformableMesh {
+        base: primitive.clone(),
+        is_flat,
+        ..match is_flat {
+            true => gathered(&mesh, &order),
+            false => mesh,
+        }
+    });
+    Ok(Some((primitive, deformable)))
+}
+
+/// As [`make_flat`] gathers the primitive's own arrays.
+fn gathered(mesh: &DeformableMesh, order: &[u32]) -> DeformableMesh {
+    let targets = mesh.targets.iter().map(|target| MorphTarget {
+        positions: gather(&target.positions, order),
+        normals: Vec::new(),
+        tangents: Vec::new(),
+    });
+    let influences = order.iter();
+    DeformableMesh {
+        targets: targets.collect(),
+        influences: influences
+            .filter_map(|vertex| mesh.influences.get(*vertex as usize).cloned())
+            .collect(),
+        ..DeformableMesh::default()
+    }
 }
 
 fn at(name: &str, part: &str) -> String {

@@ -5,29 +5,40 @@
 //!
 //! Only what the drawn scene reaches is read: a damaged image that nothing shows does no harm. Drawn are the nodes of the
 //! default scene, or of the first scene where no default is named, or all root nodes where there is no scene. A node
-//! animation is applied where one is asked for, skins and morph targets are not; occlusion textures are not read, because the light transport computes what they fake.
+//! animation is applied where one is asked for; skins and morph targets shape their meshes. Occlusion textures are not read, because the light transport computes what they fake.
 
 mod animation;
 mod container;
+mod deformable;
 mod document;
 mod image;
+mod instancing;
+mod lights;
 mod material;
 mod mesh;
+mod nodes;
 mod notes;
+mod slots;
+mod specular_glossiness;
+mod uv_sets;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DMat4, DQuat, DVec3};
-use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
-use gltf::json::validation::Checked;
 
 use super::Instance;
 use super::animation::InstanceAnimation;
+use super::deformation::{DeformableMesh, Deformation};
 use super::sandbox::Sandbox;
 use container::malformed;
-use document::{Document, Node};
+use deformable::read_skin;
+use document::Document;
+use instancing::copies;
+use lights::place_light;
+pub use lights::{PlacedLight, PunctualLight};
+use nodes::Node;
 use notes::{Note, Notes};
 
 /// What a glTF file brings into an object.
@@ -42,29 +53,6 @@ pub struct GltfScene {
     pub files: Vec<PathBuf>,
     /// One line each; the caller adds the file's name.
     pub warnings: Vec<String>,
-}
-
-/// A light of KHR_lights_punctual. It sits at the origin of its space and shines along -Z; scale has no effect on its strength.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlacedLight {
-    pub object_from_light: DMat4,
-    pub kind: PunctualLight,
-}
-
-/// The file's candela and lux are taken as W/sr and W/m^2, number for number: glTF names no luminous efficacy, and the
-/// photograph's exposure sets the scale anyway. `range` is not applied: it is a hint for rasterisers, and light has no end.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PunctualLight {
-    /// W/sr.
-    Point { intensity: [f32; 3] },
-    /// W/sr; half-angles from the axis in degrees, `0 <= inner < outer <= 90`.
-    Spot {
-        intensity: [f32; 3],
-        inner_deg: f64,
-        outer_deg: f64,
-    },
-    /// W/m^2 on a plane across the light.
-    Directional { irradiance: [f32; 3] },
 }
 
 /// A glTF file that cannot be read; the message is one line and names the file and the place in it.
@@ -96,9 +84,6 @@ impl Problem {
             "KHR_texture_basisu" => {
                 "; convert the textures to PNG, for example with `npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb`"
             }
-            "KHR_materials_pbrSpecularGlossiness" => {
-                "; convert the file with `npx @gltf-transform/cli metalrough IN.glb OUT.glb`"
-            }
             "EXT_texture_avif" => {
                 "; convert the textures with `npx @gltf-transform/cli png IN.glb OUT.glb`"
             }
@@ -127,17 +112,20 @@ impl std::error::Error for GltfError {}
 
 /// Extensions that a file may require. Variants: the default material is what a file shows before anyone picks one.
 const SUPPORTED_EXTENSIONS: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_node_visibility",
     "KHR_texture_transform",
 ];
 
@@ -209,6 +197,10 @@ fn load(
         .map(|wanted| animation::read(&document, wanted))
         .transpose()?
         .map(Arc::new);
+    let nodes = match &animation {
+        Some(animation) => Arc::clone(animation),
+        None => Arc::new(animation::at_rest(&document)?),
+    };
     for (index, object_from_node) in placed {
         let node = &document.nodes[index];
         if let Some(placed) = &node.extensions.light {
@@ -222,26 +214,53 @@ fn load(
             notes.add(Note::Collapsed, 1, &format!("nodes[{index}]"));
             continue;
         }
-        if node.skin.is_some() {
-            notes.add(Note::Skinned, 1, &format!("nodes[{index}]"));
-        }
-        if is_morphed(&document, node, mesh) {
-            notes.add(Note::MorphTargets, 1, &format!("nodes[{index}]"));
-        }
-        for drawn in meshes.get(mesh, &format!("nodes[{index}]"), &mut notes)? {
+        let at = format!("nodes[{index}]");
+        let drawn = meshes.get(mesh, &at, &mut notes)?;
+        let deformable: Vec<&DeformableMesh> = drawn
+            .iter()
+            .filter_map(|d| d.deformable.as_deref())
+            .collect();
+        let skin = match node.skin {
+            Some(skin) if !deformable.is_empty() => Some(read_skin(&document, skin, &deformable)?),
+            _ => None,
+        };
+        let copies = match &node.extensions.instancing {
+            Some(instancing) if skin.is_none() => copies(instancing, &document, &at)?,
+            _ => vec![DMat4::IDENTITY],
+        };
+        for drawn in &drawn {
             let material = materials.get(drawn.material, &drawn.primitive, &mut notes)?;
             scene.has_materials |= drawn.material.is_some();
-            scene.instances.push(Instance {
-                object_from_local: object_from_node,
-                animation: (animation.as_ref())
-                    .filter(|animation| animation.moves(index))
-                    .map(|animation| InstanceAnimation {
-                        animation: Arc::clone(animation),
-                        node: index,
-                    }),
-                primitive: drawn.primitive.clone(),
-                material,
+            let deformation = drawn.deformable.as_ref().map(|mesh_of| Deformation {
+                mesh: Arc::clone(mesh_of),
+                weights: rest_weights(&document, node, mesh),
+                skin: skin.clone(),
+                animation: Arc::clone(&nodes),
+                node: index,
             });
+            let is_skinned = deformation.as_ref().is_some_and(|d| d.skin.is_some());
+            let primitive = match &deformation {
+                Some(deformation) => Arc::new(deformation.at(0.0)),
+                None => Arc::clone(&drawn.primitive),
+            };
+            for node_from_local in &copies {
+                scene.instances.push(Instance {
+                    object_from_local: match is_skinned {
+                        true => DMat4::IDENTITY,
+                        false => object_from_node * *node_from_local,
+                    },
+                    animation: (animation.as_ref())
+                        .filter(|animation| animation.moves(index) && !is_skinned)
+                        .map(|animation| InstanceAnimation {
+                            animation: Arc::clone(animation),
+                            node: index,
+                            node_from_local: *node_from_local,
+                        }),
+                    deformation: deformation.clone(),
+                    primitive: Arc::clone(&primitive),
+                    material: Arc::clone(&material),
+                });
+            }
         }
     }
     if scene.instances.is_empty() && scene.lights.is_empty() {
@@ -251,11 +270,18 @@ fn load(
     Ok(scene)
 }
 
-/// Whether morph targets have a part in the rest pose; a node's weights go before its mesh's.
-fn is_morphed(document: &Document, node: &Node, mesh: usize) -> bool {
+/// Of the morph targets; a node's weights go before its mesh's.
+fn rest_weights(document: &Document, node: &Node, mesh: usize) -> Vec<f64> {
     let of_mesh = || document.meshes.get(mesh)?.weights.clone();
     let weights = node.weights.clone().or_else(of_mesh).unwrap_or_default();
-    weights.iter().any(|weight| *weight != 0.0)
+    let finite = |weight: &f32| {
+        if weight.is_finite() {
+            f64::from(*weight)
+        } else {
+            0.0
+        }
+    };
+    weights.iter().map(finite).collect()
 }
 
 fn check_extensions(document: &Document, notes: &mut Notes) -> Result<(), Problem> {
@@ -323,12 +349,12 @@ fn placed_nodes(document: &Document, notes: &mut Notes) -> Result<Vec<(usize, DM
             }
             first.nodes.clone()
         }
-        (None, None) => return Ok(reachable),
+        (None, None) => return Ok(visible(document, &parents, reachable)),
     };
     if let Some(&node) = roots.iter().find(|&&node| node >= count) {
         return Err(no_such_node("scenes", node, count));
     }
-    walk(document, roots)
+    Ok(visible(document, &parents, walk(document, roots)?))
 }
 
 /// Where every node has at most one parent, whatever no root reaches is on a cycle or hangs from one: upwards leads onto it.
@@ -378,6 +404,27 @@ fn walk(document: &Document, roots: Vec<usize>) -> Result<Vec<(usize, DMat4)>, P
     Ok(placed)
 }
 
+/// Without nodes that are hidden, or hang from one that is.
+fn visible(
+    document: &Document,
+    parents: &[Option<usize>],
+    placed: Vec<(usize, DMat4)>,
+) -> Vec<(usize, DMat4)> {
+    let is_hidden = |node: &usize| {
+        let visibility = &document.nodes[*node].extensions.visibility;
+        visibility
+            .as_ref()
+            .is_some_and(|visibility| !visibility.visible)
+    };
+    let hangs = |node: usize| {
+        std::iter::successors(Some(node), |node| parents[*node]).any(|node| is_hidden(&node))
+    };
+    placed
+        .into_iter()
+        .filter(|(node, _)| !hangs(*node))
+        .collect()
+}
+
 fn local_transform(node: &Node, index: usize) -> Result<DMat4, Problem> {
     let bad = |reason: &str| malformed(format!("nodes[{index}]"), reason);
     let matrix = match node.matrix {
@@ -409,60 +456,4 @@ fn local_transform(node: &Node, index: usize) -> Result<DMat4, Problem> {
     } else {
         Err(bad("its transform is not finite"))
     }
-}
-
-fn place_light(
-    document: &Document,
-    index: usize,
-    object_from_light: DMat4,
-) -> Result<PlacedLight, Problem> {
-    let at = format!("KHR_lights_punctual lights[{index}]");
-    let light = document.lights.get(index).ok_or_else(|| {
-        malformed(
-            &at,
-            format!("does not exist; there are {}", document.lights.len()),
-        )
-    })?;
-    let strength = light.color.map(|channel| channel * light.intensity);
-    if !strength.iter().all(|s| s.is_finite() && *s >= 0.0) {
-        return Err(malformed(
-            &at,
-            "its color times intensity is negative or not finite",
-        ));
-    }
-    let kind = match (light.type_, &light.spot) {
-        (Checked::Valid(LightType::Point), _) => PunctualLight::Point {
-            intensity: strength,
-        },
-        (Checked::Valid(LightType::Directional), _) => PunctualLight::Directional {
-            irradiance: strength,
-        },
-        (Checked::Valid(LightType::Spot), Some(spot)) => {
-            let inner_deg = f64::from(spot.inner_cone_angle).to_degrees();
-            // The f32 nearest to pi/2 lies above it.
-            let outer_deg = f64::from(spot.outer_cone_angle).to_degrees().min(90.0);
-            let too_wide = spot.outer_cone_angle > std::f32::consts::FRAC_PI_2;
-            if !(inner_deg >= 0.0 && inner_deg < outer_deg) || too_wide {
-                return Err(malformed(
-                    &at,
-                    "its cone angles are not 0 <= inner < outer <= pi/2",
-                ));
-            }
-            PunctualLight::Spot {
-                intensity: strength,
-                inner_deg,
-                outer_deg,
-            }
-        }
-        (Checked::Valid(LightType::Spot), None) => {
-            return Err(malformed(&at, "a spot without its `spot` object"));
-        }
-        (Checked::Invalid, _) => {
-            return Err(malformed(&at, "its type is not point, spot or directional"));
-        }
-    };
-    Ok(PlacedLight {
-        object_from_light,
-        kind,
-    })
 }

@@ -10,8 +10,6 @@ pub(super) enum Note {
     Incomplete,
     ZeroNormals,
     BadTangents,
-    MorphTargets,
-    Skinned,
     Collapsed,
     MissingUv,
     EmptyTexture,
@@ -64,8 +62,6 @@ impl Notes {
                     Note::BadTangents => {
                         format!("derived tangents from the texture coordinates instead of unusable ones in {place}")
                     }
-                    Note::MorphTargets => format!("morph targets are not applied, the base shape is shown: {place}"),
-                    Note::Skinned => format!("skins are not applied, the rest pose is shown: {place}"),
                     Note::Collapsed => {
                         format!("left out what a transform flattens to nothing: {place}")
                     }

@@ -17,7 +17,7 @@ fn the_shortest_scene_has_the_stated_defaults() {
     // Half the height over the tangent of 22.5 degrees, sqrt(2) - 1.
     assert!((camera.fy - 24.0 / (2.0_f64.sqrt() - 1.0)).abs() < 1e-9);
     assert_eq!(camera.fx, camera.fy);
-    assert_eq!(camera.distortion, [0.0; 5]);
+    assert!(camera.distortion.is_none());
     assert_eq!(camera.world_from_camera, DMat4::IDENTITY);
     assert_eq!(
         scene.lens,
@@ -43,6 +43,7 @@ fn the_shortest_scene_has_the_stated_defaults() {
             multiple_scattering: true,
             exposure: Exposure::Ev(0.0),
             backdrop: Backdrop::Photograph(None),
+            upright_photo: false,
         }
     );
 }
@@ -201,6 +202,7 @@ fn settings_and_flags() {
         multiple_scattering: true,
         exposure: Exposure::Ev(-1.0),
         backdrop: Backdrop::Photograph(None),
+        upright_photo: false,
     };
     assert_eq!(settings, from_file);
     settings.apply(&Overrides::default());

@@ -49,7 +49,7 @@ fn png_of_eight_bits() {
     let rgb = image::RgbImage::from_fn(4, 3, |x, y| image::Rgb([x as u8 * 60, y as u8 * 90, 255]));
     rgb.save(folder.path("photo.png")).unwrap();
     let photo = folder.photo("photo.png").unwrap().photo.unwrap();
-    let EncodedPhoto::Srgb8(codes) = &photo.encoded else {
+    let EncodedPhoto::Codes8(codes) = &photo.encoded else {
         panic!("not 8 bits")
     };
     assert_eq!(codes[5], [60, 90, 255]);
@@ -63,14 +63,14 @@ fn png_of_eight_bits() {
     let scene = folder.photo("grey.png").unwrap();
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
     assert!(
-        matches!(&scene.photo.unwrap().encoded, EncodedPhoto::Srgb8(codes) if codes[0] == [7; 3])
+        matches!(&scene.photo.unwrap().encoded, EncodedPhoto::Codes8(codes) if codes[0] == [7; 3])
     );
     let clear = image::RgbaImage::from_pixel(4, 3, image::Rgba([7, 8, 9, 0]));
     clear.save(folder.path("clear.png")).unwrap();
     let scene = folder.photo("clear.png").unwrap();
     assert_eq!(scene.warnings, ["clear.png: its alpha channel is ignored"]);
     assert!(
-        matches!(&scene.photo.unwrap().encoded, EncodedPhoto::Srgb8(codes) if codes[0] == [7, 8, 9])
+        matches!(&scene.photo.unwrap().encoded, EncodedPhoto::Codes8(codes) if codes[0] == [7, 8, 9])
     );
 }
 
@@ -83,7 +83,7 @@ fn png_of_sixteen_bits() {
         .save(folder.path("photo.png"))
         .unwrap();
     let photo = folder.photo("photo.png").unwrap().photo.unwrap();
-    let EncodedPhoto::Srgb16(codes) = &photo.encoded else {
+    let EncodedPhoto::Codes16(codes) = &photo.encoded else {
         panic!("not 16 bits")
     };
     assert_eq!(codes[5], [20001, 1, 65535]);
@@ -93,7 +93,7 @@ fn png_of_sixteen_bits() {
         .save(folder.path("grey.png"))
         .unwrap();
     let photo = folder.photo("grey.png").unwrap().photo.unwrap();
-    assert!(matches!(&photo.encoded, EncodedPhoto::Srgb16(codes) if codes[0] == [300; 3]));
+    assert!(matches!(&photo.encoded, EncodedPhoto::Codes16(codes) if codes[0] == [300; 3]));
 }
 
 /// Inserts a chunk after IHDR; decoders need no valid CRC of gAMA here, but a right one is cheap to give.
@@ -137,7 +137,7 @@ fn gamma_chunks_are_ignored_with_a_warning() {
             scene.warnings
         );
         assert!(
-            matches!(&scene.photo.unwrap().encoded, EncodedPhoto::Srgb8(codes) if codes[0] == [100, 150, 200])
+            matches!(&scene.photo.unwrap().encoded, EncodedPhoto::Codes8(codes) if codes[0] == [100, 150, 200])
         );
     }
 }
@@ -151,7 +151,7 @@ fn jpeg() {
     std::fs::copy(folder.path("photo.jpg"), folder.path("photo.bin")).unwrap();
     for name in ["photo.jpg", "photo.bin"] {
         let photo = folder.photo(name).unwrap().photo.unwrap();
-        let EncodedPhoto::Srgb8(codes) = &photo.encoded else {
+        let EncodedPhoto::Codes8(codes) = &photo.encoded else {
             panic!("not 8 bits")
         };
         assert!(

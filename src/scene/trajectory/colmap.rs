@@ -5,13 +5,14 @@
 //! By hand: lines of words, where an error has to name the line and what was expected on it.
 
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DQuat, DVec3};
 
+use super::intrinsics::{COEFFICIENTS, Fields, LensModel, Names};
 use super::{
     Entry, EntryKey, Intrinsics, KnownPoint, Result, Trajectory, from_opencv_axes, line_error,
-    numbers, pose_of_quaternion, read_text,
+    name_of, numbers, pose_of_quaternion, read_text,
 };
 
 pub(super) fn read(folder: &Path, images: &Path) -> Result<Trajectory> {
@@ -42,15 +43,26 @@ pub(super) fn read(folder: &Path, images: &Path) -> Result<Trajectory> {
     }
     let mut files = vec![images.to_owned(), cameras_path];
     files.extend(points_path.is_file().then_some(points_path));
+    Ok(whole_model(images, files, &cameras, entries, known_points))
+}
+
+/// The trajectory of a model, text or binary.
+pub(super) fn whole_model(
+    images: &Path,
+    files: Vec<PathBuf>,
+    cameras: &HashMap<u32, Intrinsics>,
+    entries: Vec<Entry>,
+    known_points: Vec<KnownPoint>,
+) -> Trajectory {
     let one_camera = (cameras.len() == 1).then(|| cameras.values().copied().next());
-    Ok(Trajectory {
+    Trajectory {
         path: images.into(),
         files,
         frames_per_second: None,
         intrinsics: one_camera.flatten(),
         entries,
         known_points,
-    })
+    }
 }
 
 fn read_cameras(path: &Path) -> Result<HashMap<u32, Intrinsics>> {
@@ -75,43 +87,91 @@ fn read_camera(words: &[&str]) -> std::result::Result<(u32, Intrinsics), String>
     let whole = |word: &str| {
         (word.parse::<u32>()).map_err(|_| format!("\"{word}\" is no whole number; expected {form}"))
     };
-    let what = "the camera's parameters";
-    let ([fx, fy, cx, cy], [k1, k2, p1, p2]) = match *model {
-        "SIMPLE_PINHOLE" => {
-            let [f, cx, cy] = numbers(rest, what)?;
-            ([f, f, cx, cy], [0.0; 4])
-        }
-        "PINHOLE" => (numbers(rest, what)?, [0.0; 4]),
-        "SIMPLE_RADIAL" => {
-            let [f, cx, cy, k] = numbers(rest, what)?;
-            ([f, f, cx, cy], [k, 0.0, 0.0, 0.0])
-        }
-        "RADIAL" => {
-            let [f, cx, cy, k1, k2] = numbers(rest, what)?;
-            ([f, f, cx, cy], [k1, k2, 0.0, 0.0])
-        }
-        "OPENCV" => {
-            let [fx, fy, cx, cy, k1, k2, p1, p2] = numbers(rest, what)?;
-            ([fx, fy, cx, cy], [k1, k2, p1, p2])
-        }
-        _ => {
-            return Err(format!(
-                "the camera model {model} is not known; expected SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL or OPENCV; undistort the images with COLMAP's image_undistorter"
-            ));
-        }
-    };
-    if !(fx > 0.0 && fy > 0.0) {
-        return Err("a focal length is not above 0; expected pixels; correct it".to_owned());
+    let size = (whole(width)?, whole(height)?);
+    Ok((whole(id)?, intrinsics_of(model, size, rest)?))
+}
+
+/// How many parameters each model has, and what stands where: f, fx and fy, cx, cy, and the coefficients by name.
+const MODELS: [(&str, &[&str]); 9] = [
+    ("SIMPLE_PINHOLE", &["f", "cx", "cy"]),
+    ("PINHOLE", &["fx", "fy", "cx", "cy"]),
+    ("SIMPLE_RADIAL", &["f", "cx", "cy", "k1"]),
+    ("RADIAL", &["f", "cx", "cy", "k1", "k2"]),
+    ("OPENCV", &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"]),
+    (
+        "OPENCV_FISHEYE",
+        &["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"],
+    ),
+    (
+        "FULL_OPENCV",
+        &[
+            "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6",
+        ],
+    ),
+    ("SIMPLE_RADIAL_FISHEYE", &["f", "cx", "cy", "k1"]),
+    ("RADIAL_FISHEYE", &["f", "cx", "cy", "k1", "k2"]),
+];
+
+/// The names of a model's parameters in order.
+pub(super) fn parameters_of(model: &str) -> std::result::Result<&'static [&'static str], String> {
+    let found = MODELS.iter().find(|(name, _)| *name == model);
+    found.map(|(_, names)| *names).ok_or_else(|| {
+        format!(
+            "the camera model {model} is not known; expected {}; undistort the images with COLMAP's image_undistorter",
+            MODELS.map(|(name, _)| name).join(", ")
+        )
+    })
+}
+
+fn intrinsics_of(
+    model: &str,
+    size: (u32, u32),
+    words: &[&str],
+) -> std::result::Result<Intrinsics, String> {
+    let names = parameters_of(model)?;
+    let values = words.iter().map(|word| {
+        let [value] = numbers::<1>(&[word], "the camera's parameters")?;
+        Ok(value)
+    });
+    let values = values.collect::<std::result::Result<Vec<f64>, String>>()?;
+    if values.len() < names.len() {
+        return Err(format!(
+            "{} parameters where {model} has {}; expected {}; complete the line",
+            values.len(),
+            names.len(),
+            names.join(" ")
+        ));
     }
-    let intrinsics = Intrinsics {
-        size: Some((whole(width)?, whole(height)?)),
-        fx,
-        fy,
-        cx,
-        cy,
-        distortion: [k1, k2, p1, p2, 0.0],
+    intrinsics(model, size, names, &values)
+}
+
+/// Of parameters by their names.
+pub(super) fn intrinsics(
+    model: &str,
+    (width, height): (u32, u32),
+    names: &[&str],
+    values: &[f64],
+) -> std::result::Result<Intrinsics, String> {
+    let value = |name: &str| {
+        let at = names.iter().position(|own| *own == name)?;
+        values.get(at).copied()
     };
-    Ok((whole(id)?, intrinsics))
+    let fields = Fields {
+        width: Some(width),
+        height: Some(height),
+        fx: value("fx").or(value("f")),
+        fy: value("fy"),
+        cx: value("cx"),
+        cy: value("cy"),
+        coefficients: COEFFICIENTS.map(value),
+        model: Some(LensModel::named(model)?),
+        ..Fields::default()
+    };
+    let names = Names {
+        fx: "fx",
+        fov_x: "fx",
+    };
+    fields.intrinsics(&names).map_err(|why| why.to_string())
 }
 
 fn read_image(
@@ -140,10 +200,8 @@ fn read_image(
                 words[8]
             )
         })?;
-    let name = words[9..].join(" ");
-    let file = Path::new(&name).file_name().unwrap_or_default();
     Ok(Entry {
-        key: EntryKey::Name(file.to_string_lossy().into_owned()),
+        key: name_of(&words[9..].join(" ")),
         place: format!("line {number}"),
         time_secs: None,
         world_from_camera: Some(from_opencv_axes(camera_from_world.inverse())),

@@ -6,15 +6,15 @@ use std::path::Path;
 use glam::DMat4;
 use serde_json::{Map, Value};
 
-use super::{Entry, EntryKey, Intrinsics, Result, Trajectory, file_error, finite, pose_of_rows};
+use super::json_intrinsics::{Style, style_of};
+use super::json_values::{Problem, number};
+use super::{Entry, EntryKey, Result, Trajectory, file_error, name_of, pose_of_rows};
 
 const POSE_KEYS: &[&str] = &[
     "world_from_camera",
     "transform_matrix",
     "camera_to_world_gltf",
 ];
-
-type Problem<T> = std::result::Result<T, String>;
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Trajectory> {
     let document: Value =
@@ -62,24 +62,36 @@ fn read_document(path: &Path, document: &Value) -> Problem<Trajectory> {
             "the frame rate is not above 0; expected frames per second; correct it".to_owned(),
         );
     }
+    let tables = std::iter::once(root).chain(frames.iter().filter_map(Value::as_object));
+    let style = style_of(tables)?;
     let mut entries = Vec::with_capacity(frames.len());
     for (index, frame) in frames.iter().enumerate() {
         let place = format!("frames[{index}]");
-        let entry =
-            read_entry(frame, place.clone()).map_err(|problem| format!("{place}: {problem}"))?;
+        let entry = read_entry(frame, root, style, place.clone())
+            .map_err(|problem| format!("{place}: {problem}"))?;
         entries.push(entry);
     }
+    // Frames that bring what is missing at the top do without its own.
+    let all_own = !entries.is_empty() && entries.iter().all(|entry| entry.intrinsics.is_some());
     Ok(Trajectory {
         path: path.into(),
         files: vec![path.into()],
         frames_per_second: rate,
-        intrinsics: read_intrinsics(root)?,
+        intrinsics: match all_own {
+            true => None,
+            false => style.of_all(root)?,
+        },
         entries,
         known_points: Vec::new(),
     })
 }
 
-fn read_entry(frame: &Value, place: String) -> Problem<Entry> {
+fn read_entry(
+    frame: &Value,
+    root: &Map<String, Value>,
+    style: Style,
+    place: String,
+) -> Problem<Entry> {
     let Some(frame) = frame.as_object() else {
         return Err("it is no object; expected a frame with its pose; correct it".to_owned());
     };
@@ -100,8 +112,7 @@ fn read_entry(frame: &Value, place: String) -> Problem<Entry> {
             let name = name
                 .as_str()
                 .ok_or("its file name is no string; expected one; correct it")?;
-            let file = Path::new(name).file_name().unwrap_or_default();
-            EntryKey::Name(file.to_string_lossy().into_owned())
+            name_of(name)
         }
         (None, None) => {
             return Err(
@@ -116,7 +127,7 @@ fn read_entry(frame: &Value, place: String) -> Problem<Entry> {
         place,
         time_secs: optional("time_secs")?,
         world_from_camera: read_pose(pose)?,
-        intrinsics: read_intrinsics(frame)?,
+        intrinsics: style.of_frame(frame, root)?,
         focus_distance_m: optional("focus_distance_m")?
             .map(|focus| match focus > 0.0 {
                 true => Ok(focus),
@@ -143,119 +154,4 @@ fn read_pose(pose: &Value) -> Problem<Option<DMat4>> {
         }
     }
     pose_of_rows(matrix).map(Some)
-}
-
-fn number(value: &Value, what: &str) -> Problem<f64> {
-    match value.as_f64() {
-        Some(x) => finite(x, what),
-        None => Err(format!(
-            "{what} is {value}; expected a finite number; correct it"
-        )),
-    }
-}
-
-fn read_intrinsics(table: &Map<String, Value>) -> Problem<Option<Intrinsics>> {
-    if let Some(camera) = table.get("camera").and_then(Value::as_object) {
-        return own_intrinsics(camera, 0.0).map(Some);
-    }
-    if table.contains_key("fl_x") {
-        return nerfstudio_intrinsics(table).map(Some);
-    }
-    if table.contains_key("fx") {
-        // Tracked videos count pixel centres from 0, as OpenCV does.
-        return own_intrinsics(table, 0.5).map(Some);
-    }
-    Ok(None)
-}
-
-fn required(table: &Map<String, Value>, key: &str) -> Problem<f64> {
-    match table.get(key) {
-        Some(value) => number(value, key),
-        None => Err(format!(
-            "the intrinsics lack `{key}`; expected it in pixels; add it"
-        )),
-    }
-}
-
-fn size(table: &Map<String, Value>, keys: [&str; 2]) -> Option<(u32, u32)> {
-    let side = |key: &str| u32::try_from(table.get(key)?.as_f64()? as u64).ok();
-    Some((side(keys[0])?, side(keys[1])?))
-}
-
-fn positive_focal_lengths(intrinsics: Intrinsics) -> Problem<Intrinsics> {
-    if intrinsics.fx > 0.0 && intrinsics.fy > 0.0 {
-        return Ok(intrinsics);
-    }
-    Err("a focal length is not above 0; expected pixels; correct the intrinsics".to_owned())
-}
-
-fn own_intrinsics(table: &Map<String, Value>, centre_offset: f64) -> Problem<Intrinsics> {
-    let distortion = match table.get("distortion") {
-        None => [0.0; 5],
-        Some(Value::Array(values)) if values.len() == 5 => {
-            let mut distortion = [0.0; 5];
-            for (k, value) in distortion.iter_mut().zip(values) {
-                *k = number(value, "a distortion coefficient")?;
-            }
-            distortion
-        }
-        Some(Value::Object(named)) => coefficients(named)?,
-        Some(_) => {
-            return Err("`distortion` is not understood; expected OpenCV's k1 k2 p1 p2 k3 as a list; correct it".to_owned());
-        }
-    };
-    positive_focal_lengths(Intrinsics {
-        size: size(table, ["width", "height"]),
-        fx: required(table, "fx")?,
-        fy: required(table, "fy")?,
-        cx: required(table, "cx")? + centre_offset,
-        cy: required(table, "cy")? + centre_offset,
-        distortion,
-    })
-}
-
-fn coefficients(table: &Map<String, Value>) -> Problem<[f64; 5]> {
-    let mut distortion = [0.0; 5];
-    for (k, key) in distortion.iter_mut().zip(["k1", "k2", "p1", "p2", "k3"]) {
-        if let Some(value) = table.get(key) {
-            *k = number(value, key)?;
-        }
-    }
-    Ok(distortion)
-}
-
-/// nerfstudio takes COLMAP's principal point, whose origin is the corner.
-fn nerfstudio_intrinsics(table: &Map<String, Value>) -> Problem<Intrinsics> {
-    let model = table
-        .get("camera_model")
-        .and_then(Value::as_str)
-        .unwrap_or("OPENCV");
-    let k4 = table.get("k4").and_then(Value::as_f64).unwrap_or(0.0);
-    if ![
-        "OPENCV",
-        "PINHOLE",
-        "SIMPLE_PINHOLE",
-        "RADIAL",
-        "SIMPLE_RADIAL",
-    ]
-    .contains(&model)
-        || k4 != 0.0
-    {
-        return Err(format!(
-            "the camera model {model} with k4 = {k4} is not known; expected OPENCV or PINHOLE without k4; undistort the frames"
-        ));
-    }
-    let fx = required(table, "fl_x")?;
-    let fy = match table.get("fl_y") {
-        Some(value) => number(value, "fl_y")?,
-        None => fx,
-    };
-    positive_focal_lengths(Intrinsics {
-        size: size(table, ["w", "h"]),
-        fx,
-        fy,
-        cx: required(table, "cx")?,
-        cy: required(table, "cy")?,
-        distortion: coefficients(table)?,
-    })
 }

@@ -1,10 +1,16 @@
 //! Camera poses of a video, from files of several programs.
 //!
-//! Read by content: a scene-like TOML file or JSON of this program, `transforms.json` of nerfstudio, COLMAP's text model, TUM trajectories. Poses
+//! Read by content: a scene-like TOML file or JSON of this program, `transforms.json` of nerfstudio, COLMAP's models, KITTI's poses, TUM trajectories. Poses
 //! become world-from-camera in metres, the camera looking along its -Z with +Y up, whatever the file's own axes.
 
 mod colmap;
+mod colmap_binary;
+mod frame_name;
+mod intrinsics;
 mod json;
+mod json_intrinsics;
+mod json_values;
+mod kitti;
 mod opencv;
 mod path;
 mod resolve;
@@ -13,19 +19,19 @@ mod tests;
 mod toml;
 mod tum;
 
+pub use frame_name::{FrameName, Naming};
+pub use intrinsics::{Focal, Intrinsics};
 pub use opencv::read_intrinsics;
 pub use path::CameraPath;
-pub use resolve::{FrameName, FrameView, Views, trailing_number};
+pub use resolve::{FrameView, Views};
 
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
 
+use super::SceneError;
 use super::pose::rigid;
-use super::projection::check_distortion;
-use super::{Camera, SceneError};
 use crate::decode::{MAX_POSES_BYTES, read_file};
-use crate::refusal::Refusal;
 
 /// Why a trajectory was refused. Displays as one line: "problem; expected ...; how to mend", with the file before it.
 #[derive(Debug, thiserror::Error)]
@@ -45,66 +51,19 @@ pub enum TrajectoryError {
 }
 
 /// What [`Trajectory::read`] tells apart, as the help of a command says it.
-pub const FORMATS: &str = ".toml or .json of this program, transforms.json of nerfstudio, COLMAP's text model (folder or images.txt), or a TUM trajectory";
+pub const FORMATS: &str = ".toml or .json of this program, transforms.json of nerfstudio, COLMAP's model (folder, or its images file), KITTI's poses, or a TUM trajectory";
 
 pub(super) type Result<T> = std::result::Result<T, TrajectoryError>;
-
-/// Pinhole intrinsics with OpenCV distortion, as [`super::Camera`] has them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Intrinsics {
-    /// Width and height of the pictures, where the file says.
-    pub size: Option<(u32, u32)>,
-    /// Pixels.
-    pub fx: f64,
-    pub fy: f64,
-    /// Pixels, corner origin.
-    pub cx: f64,
-    pub cy: f64,
-    /// OpenCV k1 k2 p1 p2 k3.
-    pub distortion: [f64; 5],
-}
-
-impl Intrinsics {
-    /// The camera that takes pictures of this size.
-    ///
-    /// # Errors
-    /// The intrinsics are of another size, or their distortion does not reach every pixel: the problem alone, without what was expected.
-    pub fn camera(
-        &self,
-        (width, height): (u32, u32),
-        world_from_camera: DMat4,
-    ) -> std::result::Result<Camera, Refusal> {
-        if let Some((own_width, own_height)) = self.size
-            && (own_width, own_height) != (width, height)
-        {
-            return Err(format!(
-                "the intrinsics are those of {own_width} x {own_height} pixels where the frames have {width} x {height}"
-            ).into());
-        }
-        let camera = Camera {
-            width,
-            height,
-            fx: self.fx,
-            fy: self.fy,
-            cx: self.cx,
-            cy: self.cy,
-            distortion: self.distortion,
-            world_from_camera,
-        };
-        check_distortion(&camera).map_err(|problem| problem.to_string())?;
-        Ok(camera)
-    }
-}
 
 /// How an entry says which picture it belongs to.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum EntryKey {
     /// The number at the end of the picture's name; its place from 0 in a stream.
     Number(u32),
-    /// File name without folders.
+    /// File name, with the folders that the file gives, `/` between them.
     Name(String),
-    /// Seconds; the picture whose name is a time stamp, or else by order.
-    Time,
+    /// Its place from 0 among the poses; that of the picture too, unless both have time stamps.
+    Order(u32),
 }
 
 /// One pose of the file.
@@ -148,23 +107,39 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// Reads a file, or a COLMAP folder with `cameras.txt` and `images.txt`.
+    /// Reads a file, or a COLMAP folder with cameras and images, as text or binary.
     ///
     /// # Errors
     /// What cannot be used, in one line: a NaN, a pose that is not rigid, an entry without its pose, two entries for one picture.
     pub fn read(path: &Path) -> Result<Self> {
         if path.is_dir() {
-            return colmap::read(path, &path.join("images.txt"))?.checked();
+            let text = path.join("images.txt");
+            return match path.join("images.bin") {
+                binary if binary.is_file() && !text.is_file() => colmap_binary::read(path, &binary),
+                _ => colmap::read(path, &text),
+            }
+            .and_then(Self::checked);
+        }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        if path.file_name().is_some_and(|name| name == "images.bin") {
+            return colmap_binary::read(folder, path).and_then(Self::checked);
         }
         let text = read_text(path)?;
         let extension = path.extension().map(|e| e.to_ascii_lowercase());
         let name = path.file_name().unwrap_or_default();
         if name == "images.txt" {
-            colmap::read(path.parent().unwrap_or(Path::new("")), path)
+            colmap::read(folder, path)
         } else if extension.is_some_and(|e| e == "toml") {
             toml::read(path, text)
         } else if text.trim_start().starts_with('{') {
             json::read(path, &text)
+        } else if kitti::is_kitti(&text) {
+            kitti::read(path, &text)
+        } else if text.contains("p_RS_R_x") {
+            Err(file_error(
+                path,
+                "it is EuRoC's ground truth, which has the poses of the body and not of a camera; expected poses of the camera; put the camera's T_BS after each and save them as a TUM trajectory",
+            ))
         } else {
             tum::read(path, &text)
         }
@@ -190,6 +165,15 @@ impl Trajectory {
         }
         Ok(self)
     }
+}
+
+/// A file's name in a trajectory: its folders as far as they are told, without `.`.
+fn name_of(path: &str) -> EntryKey {
+    let path = path.replace('\\', "/");
+    let parts = path
+        .split('/')
+        .filter(|part| !part.is_empty() && *part != ".");
+    EntryKey::Name(parts.collect::<Vec<_>>().join("/"))
 }
 
 fn read_text(path: &Path) -> Result<String> {

@@ -4,7 +4,8 @@
 
 use std::path::Path;
 
-use super::{Intrinsics, Result, file_error, line_error, numbers, read_text};
+use super::intrinsics::LensModel;
+use super::{Focal, Intrinsics, Result, file_error, line_error, numbers, read_text};
 
 const MATRIX_KEYS: &[&str] = &["camera_matrix", "cameraMatrix", "Camera_Matrix"];
 const DISTORTION_KEYS: &[&str] = &[
@@ -36,24 +37,34 @@ pub fn read_intrinsics(path: &Path) -> Result<Intrinsics> {
             "the camera matrix is not fx 0 cx, 0 fy cy, 0 0 1; expected focal lengths above 0 and no skew; correct it".to_owned(),
         ));
     }
-    let mut distortion = [0.0; 5];
+    let model = model_of(&text).map_err(|problem| file_error(path, problem))?;
+    let mut coefficients = [None; 12];
     if let Some((line, words)) = matrix(&text, DISTORTION_KEYS) {
         let words = slices(&words);
         let at_line = |problem| line_error(path, line, problem);
         for (index, word) in words.iter().enumerate() {
             let [k] = numbers::<1>(&[word], "distortion coefficients").map_err(at_line)?;
-            match distortion.get_mut(index) {
-                Some(coefficient) => *coefficient = k,
+            // A fisheye's four are k1 to k4.
+            let place = match (model, index) {
+                (Some(LensModel::Fisheye), 2 | 3) => index + 2,
+                _ => index,
+            };
+            match coefficients.get_mut(place) {
+                Some(coefficient) => *coefficient = Some(k),
                 None if k == 0.0 => {}
                 None => {
                     return Err(at_line(format!(
-                        "coefficient {} is {k}; expected k1 k2 p1 p2 k3 alone; calibrate without the rational model",
+                        "coefficient {} is {k}; expected OpenCV's twelve up to the thin prism; calibrate without a tilted sensor",
                         index + 1
                     )));
                 }
             }
         }
     }
+    let model = model.unwrap_or(LensModel::Rational);
+    let distortion = model
+        .lens(&coefficients)
+        .map_err(|why| file_error(path, why.to_string()))?;
     let side = |key: &str| {
         let value = text
             .lines()
@@ -62,12 +73,28 @@ pub fn read_intrinsics(path: &Path) -> Result<Intrinsics> {
     };
     Ok(Intrinsics {
         size: side("image_width").zip(side("image_height")),
-        fx,
-        fy,
-        cx: cx + 0.5,
-        cy: cy + 0.5,
+        focal: Focal::Pixels([fx, fy]),
+        centre: Some([cx + 0.5, cy + 0.5]),
         distortion,
     })
+}
+
+/// Where the file says it: by name, or that it is a fisheye.
+fn model_of(text: &str) -> std::result::Result<Option<LensModel>, String> {
+    let value = |key: &str| {
+        let value = text
+            .lines()
+            .find_map(|line| line.trim().strip_prefix(key)?.strip_prefix(':'))?;
+        Some(value.trim().trim_matches(['"', '\'']))
+    };
+    let is_fisheye = value("fisheye_model").or(value("is_fisheye"));
+    if is_fisheye.is_some_and(|yes| ["1", "true"].contains(&yes)) {
+        return Ok(Some(LensModel::Fisheye));
+    }
+    let named = ["distortion_model", "camera_model"]
+        .into_iter()
+        .find_map(value);
+    named.map(LensModel::named).transpose()
 }
 
 fn slices(words: &[String]) -> Vec<&str> {

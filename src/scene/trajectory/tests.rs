@@ -46,7 +46,14 @@ fn frame(file: Option<&str>, number: u32) -> FrameName {
         label: "frame".into(),
         file: file.map(str::to_owned),
         number,
+        place: number,
+        time_secs: file.and_then(|file| Naming::of(std::iter::once(file)).time_secs(file)),
     }
+}
+
+/// k1 k2 p1 p2 k3.
+fn lens(intrinsics: &Intrinsics) -> [f64; 5] {
+    std::array::from_fn(|i| intrinsics.distortion.coefficients[i])
 }
 
 fn assert_pose(found: Option<DMat4>, expected: DMat4) {
@@ -73,7 +80,8 @@ fn json_of_three_programs_is_one_pose() {
     assert_eq!(view.time_secs, Some(0.2));
     assert_eq!(view.focus_distance_m, Some(0.7));
     let intrinsics = view.intrinsics.expect("given");
-    assert_eq!((intrinsics.cx, intrinsics.size), (320.0, Some((640, 480))));
+    assert_eq!(intrinsics.centre, Some([320.0, 240.0]));
+    assert_eq!(intrinsics.size, Some((640, 480)));
     assert_eq!(
         views.of(&frame(None, 6)).expect("null").world_from_camera,
         None
@@ -91,12 +99,8 @@ fn json_of_three_programs_is_one_pose() {
         .expect("reads");
     assert_pose(tracked.entries[0].world_from_camera, pose());
     let intrinsics = tracked.intrinsics.expect("given");
-    assert_eq!(
-        (intrinsics.cx, intrinsics.cy),
-        (320.0, 240.0),
-        "half a pixel"
-    );
-    assert_eq!(intrinsics.distortion[0], 0.1);
+    assert_eq!(intrinsics.centre, Some([320.0, 240.0]), "half a pixel");
+    assert_eq!(intrinsics.distortion.coefficients[0], 0.1);
 
     let nerfstudio = folder
         .read(
@@ -109,8 +113,9 @@ fn json_of_three_programs_is_one_pose() {
         )
         .expect("reads");
     let intrinsics = nerfstudio.intrinsics.expect("given");
-    assert_eq!(intrinsics.distortion, [0.05, 0.0, 0.0, 0.01, 0.0]);
-    assert_eq!((intrinsics.fy, intrinsics.cx), (502.0, 320.0));
+    assert_eq!(lens(&intrinsics), [0.05, 0.0, 0.0, 0.01, 0.0]);
+    assert_eq!(intrinsics.focal, Focal::Pixels([500.0, 502.0]));
+    assert_eq!(intrinsics.centre, Some([320.0, 240.0]));
     let views = Views::new(&nerfstudio, Some(10.0), false).expect("no doubles");
     let view = views
         .of(&frame(Some("frame_00001.png"), 1))
@@ -209,9 +214,9 @@ fn json_refusals_name_the_frame() {
         ("{\"frames\": [".to_owned(), "valid JSON"),
         ("{}".to_owned(), "`frames`"),
         (
-            r#"{"fl_x": 5, "cx": 1, "cy": 1, "camera_model": "OPENCV_FISHEYE", "frames": []}"#
+            r#"{"fl_x": 5, "cx": 1, "cy": 1, "camera_model": "EQUIRECTANGULAR", "frames": []}"#
                 .to_owned(),
-            "OPENCV_FISHEYE",
+            "EQUIRECTANGULAR",
         ),
     ] {
         folder.refused("bad.json", &text, part);
@@ -247,10 +252,10 @@ fn colmap_and_tum_turn_their_axes() {
     folder.write("images.txt", &images);
     let colmap = Trajectory::read(folder.0.path()).expect("reads");
     assert_eq!(colmap.entries.len(), 2);
-    assert_eq!(colmap.entries[0].key, EntryKey::Name("a 1.png".into()));
+    assert_eq!(colmap.entries[0].key, EntryKey::Name("left/a 1.png".into()));
     assert_pose(colmap.entries[0].world_from_camera, pose());
     let intrinsics = colmap.entries[0].intrinsics.expect("given");
-    assert_eq!(intrinsics.distortion, [0.1, 0.2, 0.01, 0.02, 0.0]);
+    assert_eq!(lens(&intrinsics), [0.1, 0.2, 0.01, 0.02, 0.0]);
     // The point lies straight ahead, and is seen at the principal point.
     assert_eq!(colmap.known_points.len(), 1);
     assert_eq!(colmap.known_points[0].seen, Some([320.0, 240.0]));
@@ -283,12 +288,12 @@ fn colmap_and_tum_turn_their_axes() {
     folder.refused("tum.txt", "2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", ":2:");
     folder.refused("images.txt", "1 1 0 0 0 0 0 nan 1 a.png\n\n", "NaN");
     folder.refused("images.txt", "1 1 0 0 0 0 0 0 9 a.png\n\n", "camera 9");
-    folder.write("cameras.txt", "1 FISHEYE 640 480 1 2 3\n");
+    folder.write("cameras.txt", "1 FOV 640 480 1 2 3\n");
     let message = Trajectory::read(folder.0.path())
         .expect_err("unknown")
         .to_string();
     assert!(
-        message.contains("cameras.txt:1") && message.contains("FISHEYE"),
+        message.contains("cameras.txt:1") && message.contains("FOV"),
         "{message}"
     );
 }
@@ -300,8 +305,8 @@ fn opencv_calibrations_are_read() {
         distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ 0.1, -0.2, 0.01, 0.02, 0.3 ]\n";
     let intrinsics = read_intrinsics(&folder.write("calib.yml", yaml)).expect("reads");
     assert_eq!(intrinsics.size, Some((640, 480)));
-    assert_eq!((intrinsics.cx, intrinsics.cy), (320.0, 240.0));
-    assert_eq!(intrinsics.distortion, [0.1, -0.2, 0.01, 0.02, 0.3]);
+    assert_eq!(intrinsics.centre, Some([320.0, 240.0]));
+    assert_eq!(lens(&intrinsics), [0.1, -0.2, 0.01, 0.02, 0.3]);
     for (text, part) in [
         (
             yaml.replace("camera_matrix", "matrix"),
@@ -310,7 +315,14 @@ fn opencv_calibrations_are_read() {
         (yaml.replace("501.", ".nan"), "calib.yml:5"),
         (yaml.replace("501.", "nan"), "NaN"),
         (yaml.replace("500., 0.", "500., 3."), "no skew"),
-        (yaml.replace("0.3 ]", "0.3, 0.7 ]"), "coefficient 6"),
+        (
+            yaml.replace("0.3 ]", "0.3, 0, 0, 0, 0, 0, 0, 0, 0.7 ]"),
+            "coefficient 13",
+        ),
+        (
+            yaml.replace("---", "distortion_model: unified"),
+            "camera model unified",
+        ),
     ] {
         let message = read_intrinsics(&folder.write("calib.yml", &text))
             .expect_err(part)

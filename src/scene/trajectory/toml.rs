@@ -4,14 +4,32 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-use super::{Entry, EntryKey, Intrinsics, Result, Trajectory};
+use super::intrinsics::{Fields, LensModel, Names};
+use super::{Entry, EntryKey, Intrinsics, Result, Trajectory, name_of};
+use crate::distortion::LENS_FISHEYE;
+use crate::scene::camera::read_distortion;
 use crate::scene::error::{Result as SceneResult, Source};
 use crate::scene::pose::read_camera_pose;
 use crate::scene::reader::{Node, Table};
 
 const KEYS: &[&str] = &["frames_per_second", "camera", "frame"];
-const CAMERA_KEYS: &[&str] = &["width", "height", "fx", "fy", "cx", "cy", "distortion"];
+const CAMERA_KEYS: &[&str] = &[
+    "width",
+    "height",
+    "fx",
+    "fy",
+    "horizontal_fov_deg",
+    "cx",
+    "cy",
+    "distortion",
+    "lens_model",
+];
+const NAMES: Names = Names {
+    fx: "fx",
+    fov_x: "horizontal_fov_deg",
+};
 const FRAME_KEYS: &[&str] = &[
+    "camera",
     "frame",
     "file",
     "time_secs",
@@ -36,15 +54,19 @@ fn read_source(source: &Source) -> SceneResult<Trajectory> {
     })?;
     let root = Table::root(source, document.get_ref());
     root.refuse_unknown(KEYS)?;
-    let intrinsics = root
-        .table("camera", "[camera]", CAMERA_KEYS)?
-        .map(|table| read_intrinsics(&table))
-        .transpose()?;
+    let camera = root.table("camera", "[camera]", CAMERA_KEYS)?;
+    let top = camera.as_ref().map(read_fields).transpose()?;
     let entries = root
         .list("frame")?
         .iter()
-        .map(|node| read_entry(node))
+        .map(|node| read_entry(node, top.unwrap_or_default()))
         .collect::<SceneResult<Vec<_>>>()?;
+    // Frames that bring what is missing at the top do without its own.
+    let all_own = !entries.is_empty() && entries.iter().all(|entry| entry.intrinsics.is_some());
+    let intrinsics = match (&camera, top) {
+        (Some(table), Some(fields)) if !all_own => Some(resolve(table, fields)?),
+        _ => None,
+    };
     Ok(Trajectory {
         path: source.path.clone(),
         files: vec![source.path.clone()],
@@ -55,31 +77,58 @@ fn read_source(source: &Source) -> SceneResult<Trajectory> {
     })
 }
 
-fn read_intrinsics(table: &Table) -> SceneResult<Intrinsics> {
+fn read_fields(table: &Table) -> SceneResult<Fields> {
     let side = |node: &Node| node.integer(1, crate::decode::MAX_SIDE_PX);
-    let width = table.optional("width", side)?;
-    let height = table.optional("height", side)?;
-    let fx = table.required("fx", "fx = 520.0", Node::positive)?;
-    Ok(Intrinsics {
-        size: width.zip(height),
-        fx,
-        fy: table.optional("fy", Node::positive)?.unwrap_or(fx),
-        cx: table.required("cx", "cx = 320.0", Node::finite)?,
-        cy: table.required("cy", "cy = 240.0", Node::finite)?,
-        distortion: table
-            .optional("distortion", |node| node.vector::<5>())?
-            .unwrap_or_default(),
+    Ok(Fields {
+        width: table.optional("width", side)?,
+        height: table.optional("height", side)?,
+        fx: table.optional("fx", Node::positive)?,
+        fy: table.optional("fy", Node::positive)?,
+        cx: table.optional("cx", Node::finite)?,
+        cy: table.optional("cy", Node::finite)?,
+        fov_x: table
+            .optional("horizontal_fov_deg", Node::positive)?
+            .map(f64::to_radians),
+        ..lens_fields(table)?
     })
 }
 
-fn read_entry(node: &Node) -> SceneResult<Entry> {
+/// The lens as a whole: a frame's own wins over that of all.
+fn lens_fields(table: &Table) -> SceneResult<Fields> {
+    let Some(lens) = read_distortion(table)? else {
+        return Ok(Fields::default());
+    };
+    let k = lens.coefficients;
+    let (model, k) = match lens.model {
+        LENS_FISHEYE => {
+            let fisheye = [k[0], k[1], 0.0, 0.0, k[2], k[3]];
+            let mut all = [0.0; 12];
+            all[..6].copy_from_slice(&fisheye);
+            (LensModel::Fisheye, all)
+        }
+        _ => (LensModel::Rational, k),
+    };
+    Ok(Fields {
+        coefficients: k.map(Some),
+        model: Some(model),
+        ..Fields::default()
+    })
+}
+
+fn resolve(table: &Table, fields: Fields) -> SceneResult<Intrinsics> {
+    fields
+        .intrinsics(&NAMES)
+        .map_err(|why| table.error(why.problem, why.expected, why.mend))
+}
+
+fn read_entry(node: &Node, top: Fields) -> SceneResult<Entry> {
     let table = node.table("[[frame]]", FRAME_KEYS)?;
     table.refuse_both("frame", "file")?;
     let number = table.optional("frame", |node| node.integer(0, u32::MAX))?;
     let file = table.optional("file", |node| Ok(node.string()?.to_owned()))?;
     let key = match (number, file) {
         (Some(number), _) => EntryKey::Number(number),
-        (None, Some(file)) => EntryKey::Name(file),
+        (None, Some(file)) => name_of(&file),
         (None, None) => {
             return Err(table.error(
                 "the frame says not which it is",
@@ -114,7 +163,10 @@ fn read_entry(node: &Node) -> SceneResult<Entry> {
         place: node.label().to_owned(),
         time_secs: table.optional("time_secs", Node::finite)?,
         world_from_camera,
-        intrinsics: None,
+        intrinsics: table
+            .table("camera", "[frame.camera]", CAMERA_KEYS)?
+            .map(|camera| resolve(&camera, read_fields(&camera)?.or(top)))
+            .transpose()?,
         focus_distance_m: table.optional("focus_distance_m", Node::positive_or_infinite)?,
     })
 }

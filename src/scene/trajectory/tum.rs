@@ -17,8 +17,8 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Trajectory> {
         }
         let number = index + 1;
         let words: Vec<&str> = line.split_whitespace().collect();
-        let entry =
-            read_line(&words, number).map_err(|problem| line_error(path, number, problem))?;
+        let entry = read_line(&words, entries.len() as u32, number)
+            .map_err(|problem| line_error(path, number, problem))?;
         if entries
             .last()
             .is_some_and(|before| before.time_secs >= entry.time_secs)
@@ -41,13 +41,13 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Trajectory> {
     })
 }
 
-fn read_line(words: &[&str], number: usize) -> std::result::Result<Entry, String> {
+fn read_line(words: &[&str], place: u32, number: usize) -> std::result::Result<Entry, String> {
     let form = "timestamp tx ty tz qx qy qz qw";
     let [time, x, y, z, qx, qy, qz, qw] = numbers::<8>(words, form)?;
     let quaternion = DQuat::from_xyzw(qx, qy, qz, qw);
     let pose = pose_of_quaternion(quaternion, DVec3::new(x, y, z))?;
     Ok(Entry {
-        key: EntryKey::Time,
+        key: EntryKey::Order(place),
         place: format!("line {number}"),
         time_secs: Some(time),
         world_from_camera: Some(from_opencv_axes(pose)),

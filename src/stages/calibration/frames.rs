@@ -103,6 +103,44 @@ fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, CalibrationError> {
     Ok(paths)
 }
 
+/// Frames that hold the very pixels of the one before them: what a film of fewer frames was stretched with. Their noise is no noise of
+/// their own.
+pub(super) fn drop_repeated(
+    scene: &SceneFrames,
+) -> Result<(SceneFrames, Option<String>), CalibrationError> {
+    let mut kept = Vec::new();
+    let mut before: Option<Frame> = None;
+    for path in &scene.paths {
+        let frame = Frame::read(path)?;
+        if before
+            .as_ref()
+            .is_none_or(|before| before.codes != frame.codes)
+        {
+            kept.push(path.clone());
+        }
+        before = Some(frame);
+    }
+    let repeated = scene.paths.len() - kept.len();
+    if kept.len() == 1 {
+        return Err(CalibrationError::Copies {
+            folder: scene.folder.clone(),
+            count: scene.paths.len(),
+        });
+    }
+    let note = (repeated > 0).then(|| {
+        format!(
+            "{}: {repeated} of {} frames repeat the one before and are left out",
+            scene.name,
+            scene.paths.len()
+        )
+    });
+    let kept = SceneFrames {
+        paths: kept,
+        ..scene.clone()
+    };
+    Ok((kept, note))
+}
+
 /// One frame's codes. Grey has three equal channels.
 pub(super) struct Frame {
     pub width: u32,
@@ -120,8 +158,8 @@ impl Frame {
         };
         let (width, height, codes) = read_codes(path).map_err(|problem| failed(problem.into()))?;
         let (codes, top) = match codes {
-            EncodedPhoto::Srgb8(codes) => (codes.iter().map(|c| c.map(u16::from)).collect(), 255),
-            EncodedPhoto::Srgb16(codes) => (codes, u16::MAX),
+            EncodedPhoto::Codes8(codes) => (codes.iter().map(|c| c.map(u16::from)).collect(), 255),
+            EncodedPhoto::Codes16(codes) => (codes, u16::MAX),
             EncodedPhoto::Linear => {
                 return Err(failed(
                     "it is a linear image; expected the camera's own encoded pictures (PNG or JPEG); convert it".to_owned(),

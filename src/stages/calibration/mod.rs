@@ -9,11 +9,12 @@
 //! - values that are or may be clipped are left out;
 //! - a frame's own gain and offset (flicker, exposure drift) are fitted against the average and removed; what still drifts within the
 //!   picture is removed by taking sigma from differences of consecutive frames, sigma^2 = sum (e[f+1] - e[f])^2 / (2 P (F - 1));
+//! - frames that repeat the one before are left out;
 //! - a scene that moves is refused;
 //! - bins with too few pixels are filled from their neighbours and marked;
 //! - correlation over space and between channels, a fit of variance against level, and confidence intervals are measured.
 //!
-//! Two passes over the frames; memory does not grow with their number. Moments come from unrounded residuals, histograms serve the report.
+//! Three passes over the frames, the first for those that repeat another; memory does not grow with their number. Moments come from unrounded residuals, histograms serve the report.
 
 mod correlation;
 mod estimate;
@@ -29,7 +30,7 @@ pub use report::report_html;
 
 use std::path::PathBuf;
 
-use crate::stages::settings::{MAX_BINS, NoiseProfile};
+use crate::stages::settings::{LAGS, MAX_BINS, NoiseProfile};
 use correlation::Correlations;
 use estimate::{Statistics, profile_of};
 use moments::SceneMoments;
@@ -47,6 +48,11 @@ pub enum CalibrationError {
     EmptyFolder { folder: PathBuf },
     #[error("{}: the scene has one frame only; expected at least two, and ten or more for a good estimate", folder.display())]
     OneFrame { folder: PathBuf },
+    #[error(
+        "{}: all {count} frames hold the same pixels; expected frames that the camera took one by one; record the scene again",
+        folder.display()
+    )]
+    Copies { folder: PathBuf, count: usize },
     #[error("{}: {problem}", path.display())]
     Frame { path: PathBuf, problem: String },
     #[error(
@@ -79,6 +85,17 @@ pub struct Calibration {
     pub notes: Vec<String>,
 }
 
+/// Correlation at the profile's last lag that is no chance and no trace of demosaicing.
+const GRAIN: f64 = 0.1;
+
+/// The largest correlation along an axis at the profile's last lag, if the grain goes on from there.
+fn reach_beyond(profile: &NoiseProfile) -> Option<f64> {
+    let last = (profile.autocorrelation.iter())
+        .flat_map(|lags| [lags[0][2 * LAGS], lags[LAGS][LAGS]])
+        .fold(0.0, f64::max);
+    (last > GRAIN).then_some(last)
+}
+
 /// Measures the noise of all `scenes`. `progress` hears how many frames of how many have been read; each is read twice.
 ///
 /// # Errors
@@ -97,13 +114,20 @@ pub fn calibrate(
     for scene in scenes {
         scene.check()?;
     }
+    let mut notes = Vec::new();
+    let mut own = Vec::new();
+    for scene in scenes {
+        let (scene, note) = frames::drop_repeated(scene)?;
+        own.push(scene);
+        notes.extend(note);
+    }
+    let scenes = own;
     let total = 2 * scenes.iter().map(|s| s.paths.len() as u64).sum::<u64>();
     let mut done = 0;
     let mut statistics = Statistics::new(bins);
     let mut correlations = Correlations::default();
     let mut sources = Vec::new();
-    let mut notes = Vec::new();
-    for scene in scenes {
+    for scene in &scenes {
         let mut step = || {
             done += 1;
             progress(done, total);
@@ -129,6 +153,11 @@ pub fn calibrate(
                 (index + 1) * 256 / bins
             ));
         }
+    }
+    if let Some(rho) = reach_beyond(&profile) {
+        notes.push(format!(
+            "the noise is alike over more than the {LAGS} pixels that a profile holds (correlation {rho:.2} there): what is rendered has finer grain; expected noise as the sensor gives it; scale the frames and photographs down, or take the camera's denoising off"
+        ));
     }
     Ok(Calibration {
         profile,

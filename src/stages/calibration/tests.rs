@@ -415,9 +415,11 @@ fn a_scene_that_moves_is_refused() {
     let error = run(&moving, 4).unwrap_err();
     assert!(matches!(error, CalibrationError::Moving { .. }), "{error}");
     assert!(error.to_string().contains("moved"), "{error}");
-    // Control: the same disc at rest is fine.
+    // Control: the same disc at rest is fine, but for one pixel, without which it would be a copy.
     let again = folder.path().join("again.png");
-    std::fs::copy(&moving[0], &again).unwrap();
+    let mut picture = image::open(&moving[0]).unwrap().into_rgb8();
+    picture.get_pixel_mut(0, 0).0[0] ^= 1;
+    picture.save(&again).unwrap();
     let still = vec![moving[0].clone(), again];
     assert!(run(&still, 4).is_ok());
 }
@@ -545,8 +547,10 @@ fn what_cannot_be_used_is_an_error() {
     assert!(message(&[at("scene")]).contains("002.png"));
     assert!(matches!(run(&frames, 3), Err(CalibrationError::Bins(3))));
     std::fs::create_dir(at("black")).unwrap();
-    for name in ["black/0.png", "black/1.png"] {
-        RgbImage::new(32, 32).save(at(name)).unwrap();
+    for (code, name) in [(0, "black/0.png"), (1, "black/1.png")] {
+        let mut black = RgbImage::new(32, 32);
+        black.get_pixel_mut(0, 0).0[0] = code;
+        black.save(at(name)).unwrap();
     }
     assert!(message(&[at("black")]).contains("clipping"));
     assert!(run(&frames, 4).is_ok(), "control");

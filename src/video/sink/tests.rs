@@ -30,7 +30,7 @@ fn frames_of_an_earlier_form_are_told() {
 fn every_damage_to_a_frame_is_seen() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("f.png");
-    let frame = frame([9, 8, 7], Pixels::Jpeg);
+    let frame = frame([9, 8, 7], Pixels::Decoded);
     let picture = Picture {
         width: 5,
         height: 4,

@@ -5,10 +5,10 @@ use std::path::Path;
 use mixray::bench::{Report, against, csv, markdown, text as table};
 use mixray::output::{ChannelFile, read_film};
 use mixray::scene::gltf::load_gltf;
-use mixray::scene::trajectory::{Trajectory, read_intrinsics};
+use mixray::scene::trajectory::{Focal, Trajectory, read_intrinsics};
 use mixray::scene::{NoiseProfile, Photo, load};
 use mixray::sequence::{SequenceOptions, check_poses};
-use mixray::video::FrameSource;
+use mixray::video::{FrameSource, Taken};
 
 use super::mutate::Random;
 use super::mutate::{bytes, glb, png, text};
@@ -173,10 +173,18 @@ fn film(path: &Path) -> Outcome {
 fn video(path: &Path) -> Outcome {
     let read = || -> Result<(), String> {
         let mut source = FrameSource::open(path).map_err(|error| error.to_string())?;
-        while let Some((_, frame)) = source.next(&|_| true).map_err(|error| error.to_string())? {
-            all_finite(&frame.ok_or("a frame was asked for and is not there")?.photo)?;
+        let mut damage = Ok(());
+        while let Some((_, taken)) = source.next(&|_| true).map_err(|error| error.to_string())? {
+            match taken {
+                Taken::Skipped => return Err("a frame was asked for and is not there".to_owned()),
+                Taken::Whole(frame) => all_finite(&frame.photo)?,
+                Taken::Damaged { problem, rest } => {
+                    rest.map_or(Ok(()), |frame| all_finite(&frame.photo))?;
+                    damage = Err(problem.to_string());
+                }
+            }
         }
-        Ok(())
+        damage
     };
     named_outcome(path, read(), Ok)
 }
@@ -210,11 +218,17 @@ fn beside(path: &Path, name: &str, bytes: &[u8]) {
 
 fn intrinsics(path: &Path) -> Outcome {
     named_outcome(path, read_intrinsics(path), |intrinsics| {
+        let focal = match intrinsics.focal {
+            Focal::Pixels(focal) => focal,
+            Focal::FieldOfView(angle) => [angle; 2],
+        };
         finite(
-            [intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy],
+            focal
+                .into_iter()
+                .chain(intrinsics.centre.into_iter().flatten()),
             "a camera",
         )?;
-        finite(intrinsics.distortion, "a distortion")
+        finite(intrinsics.distortion.coefficients, "a distortion")
     })
 }
 

@@ -120,7 +120,8 @@ pub fn films() -> Vec<Vec<u8>> {
     scene.settings.rays_per_pixel = 4;
     scene.settings.backend = mixray::scene::BackendChoice::Cpu;
     let options = RendererOptions {
-        all_planes: true,
+        guides: true,
+        real_everywhere: true,
         sample_range: Some((0, 2)),
         ..RendererOptions::default()
     };

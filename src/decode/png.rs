@@ -1,0 +1,85 @@
+//! What stands beside the pixels of a PNG file and says what their codes mean.
+
+/// PNG's units of 1/100000: sRGB to within its own table.
+const SRGB_GAMMA: std::ops::RangeInclusive<u32> = 45_000..=46_000;
+/// White and primaries of sRGB.
+const SRGB_CHROMATICITIES: [u32; 8] = [31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000];
+/// How far chromaticities lie from those at most.
+const SAME_CHROMATICITY: u32 = 200;
+
+/// Of the chunks before the pixels.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct ColourChunks {
+    pub cicp: Option<[u8; 4]>,
+    /// A gamma or primaries that are not sRGB's and nothing that speaks for them.
+    pub has_other_colours: bool,
+}
+
+pub(super) fn colour_chunks(bytes: &[u8]) -> ColourChunks {
+    let mut found = ColourChunks::default();
+    let (mut srgb, mut other) = (false, false);
+    let mut rest = bytes.get(8..).unwrap_or_default();
+    while let Some((header, tail)) = rest.split_first_chunk::<8>() {
+        let [a, b, c, d, name @ ..] = header;
+        let length = u32::from_be_bytes([*a, *b, *c, *d]) as usize;
+        let data = tail.get(..length).unwrap_or_default();
+        let numbers = || {
+            data.as_chunks()
+                .0
+                .iter()
+                .map(|word| u32::from_be_bytes(*word))
+        };
+        match name {
+            b"cICP" => found.cicp = data.try_into().ok(),
+            b"sRGB" => srgb = true,
+            b"gAMA" => other |= !numbers().all(|gamma| SRGB_GAMMA.contains(&gamma)),
+            b"cHRM" => {
+                let mut pairs = numbers().zip(SRGB_CHROMATICITIES);
+                other |= !pairs.all(|(a, b)| a.abs_diff(b) <= SAME_CHROMATICITY);
+            }
+            b"IDAT" => break,
+            _ => {}
+        }
+        rest = tail.get(length.saturating_add(4)..).unwrap_or_default();
+    }
+    found.has_other_colours = other && !srgb;
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(chunks: &[(&[u8; 4], Vec<u8>)]) -> Vec<u8> {
+        let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
+        for (name, data) in chunks {
+            bytes.extend((data.len() as u32).to_be_bytes());
+            bytes.extend(*name);
+            bytes.extend(data);
+            bytes.extend([0; 4]);
+        }
+        bytes
+    }
+
+    fn words(numbers: &[u32]) -> Vec<u8> {
+        numbers.iter().flat_map(|n| n.to_be_bytes()).collect()
+    }
+
+    #[test]
+    fn only_what_is_not_srgb_is_told() {
+        let other = |chunks: &[(&[u8; 4], Vec<u8>)]| colour_chunks(&file(chunks)).has_other_colours;
+        let same = (b"cHRM", words(&SRGB_CHROMATICITIES));
+        assert!(!other(&[(b"gAMA", words(&[45455])), same]));
+        assert!(other(&[(b"gAMA", words(&[100_000]))]));
+        let p3 = [31270, 32900, 68000, 32000, 26500, 69000, 15000, 6000];
+        assert!(other(&[(b"gAMA", words(&[45455])), (b"cHRM", words(&p3))]));
+        assert!(
+            !other(&[(b"gAMA", words(&[100_000])), (b"sRGB", vec![0])]),
+            "a fallback"
+        );
+        let after = [(b"IDAT", vec![]), (b"gAMA", words(&[100_000]))];
+        assert!(!other(&after), "control: pixels come first");
+        let cicp = file(&[(b"cICP", vec![12, 13, 0, 1])]);
+        assert_eq!(colour_chunks(&cicp).cicp, Some([12, 13, 0, 1]));
+    }
+}

@@ -1,0 +1,230 @@
+//! Colours of codes that are not sRGB: ICC profiles of matrices and curves, and what stands for one in a PNG file.
+
+use std::fmt;
+
+use glam::{DMat3, DVec3};
+use moxcms::{
+    CicpProfile, ColorProfile, DataColorSpace, LocalizableString, MatrixCoefficients, ProfileText,
+    ToneReprCurve, TransferCharacteristics,
+};
+
+/// Codes of a curve's table.
+const CODES: usize = 1 << 16;
+/// Matrices that differ by less are one: those of sRGB profiles differ by their rounding.
+const SAME_MATRIX: f64 = 3e-3;
+
+/// From codes to linear Rec.709 and back.
+pub struct ColourProfile {
+    /// What goes on to pictures that keep the codes.
+    icc: Vec<u8>,
+    /// Linear values of all codes of 16 bits, rising, a channel each.
+    curves: [Vec<f32>; 3],
+    rec709_from_device: DMat3,
+    device_from_rec709: DMat3,
+}
+
+/// Why a profile is not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Unused {
+    /// Its colours are sRGB's.
+    IsSrgb,
+    NotUnderstood,
+}
+
+impl ColourProfile {
+    /// Of an ICC profile: gray, or RGB by matrix and curves.
+    pub(super) fn of_icc(icc: Vec<u8>) -> Result<Self, Unused> {
+        let profile = ColorProfile::new_from_slice(&icc).map_err(|_| Unused::NotUnderstood)?;
+        match profile.color_space {
+            DataColorSpace::Rgb => Self::of_profile(&profile, icc),
+            DataColorSpace::Gray => {
+                let curve = profile.gray_trc.clone().ok_or(Unused::NotUnderstood)?;
+                Self::of_curve(curve)
+            }
+            _ => Err(Unused::NotUnderstood),
+        }
+    }
+
+    /// Of a PNG file's cICP chunk: primaries, curve, matrix, range.
+    pub(super) fn of_cicp([primaries, curve, matrix, range]: [u8; 4]) -> Result<Self, Unused> {
+        let unknown = |_| Unused::NotUnderstood;
+        let transfer = TransferCharacteristics::try_from(curve).map_err(unknown)?;
+        let is_hdr = matches!(
+            transfer,
+            TransferCharacteristics::Smpte2084 | TransferCharacteristics::Hlg
+        );
+        if is_hdr || matrix != 0 || range != 1 {
+            return Err(Unused::NotUnderstood);
+        }
+        let profile = ColorProfile::new_from_cicp(CicpProfile {
+            color_primaries: primaries.try_into().map_err(unknown)?,
+            transfer_characteristics: transfer,
+            matrix_coefficients: MatrixCoefficients::Identity,
+            full_range: true,
+        });
+        Self::of_made(profile)
+    }
+
+    /// Gray spread to three channels: sRGB's primaries with the curve of the gray profile.
+    fn of_curve(curve: ToneReprCurve) -> Result<Self, Unused> {
+        let mut profile = ColorProfile::new_srgb();
+        profile.cicp = None;
+        profile.red_trc = Some(curve.clone());
+        profile.green_trc = Some(curve.clone());
+        profile.blue_trc = Some(curve);
+        Self::of_made(profile)
+    }
+
+    fn of_made(mut profile: ColorProfile) -> Result<Self, Unused> {
+        let text = |value: &str| {
+            let text = LocalizableString::new("en".into(), "US".into(), value.into());
+            Some(ProfileText::Localizable(vec![text]))
+        };
+        profile.description = text("Colours of the photograph");
+        profile.copyright = text("Public domain");
+        let icc = profile.encode().map_err(|_| Unused::NotUnderstood)?;
+        Self::of_profile(&profile, icc)
+    }
+
+    fn of_profile(profile: &ColorProfile, icc: Vec<u8>) -> Result<Self, Unused> {
+        let srgb = ColorProfile::new_srgb();
+        let curves = [&profile.red_trc, &profile.green_trc, &profile.blue_trc].map(table);
+        let [Some(red), Some(green), Some(blue)] = curves else {
+            return Err(Unused::NotUnderstood);
+        };
+        let curves = [red, green, blue];
+        let rows = profile.transform_matrix(&srgb).v;
+        let rec709_from_device = DMat3::from_cols_array_2d(&rows).transpose();
+        let device_from_rec709 = rec709_from_device.inverse();
+        if !(rec709_from_device.is_finite() && device_from_rec709.is_finite()) {
+            return Err(Unused::NotUnderstood);
+        }
+        let same_matrix = rec709_from_device.abs_diff_eq(DMat3::IDENTITY, SAME_MATRIX);
+        let reference = table(&srgb.red_trc).ok_or(Unused::NotUnderstood)?;
+        if same_matrix
+            && curves
+                .iter()
+                .all(|curve| is_within_a_code(curve, &reference))
+        {
+            return Err(Unused::IsSrgb);
+        }
+        Ok(Self {
+            icc,
+            curves,
+            rec709_from_device,
+            device_from_rec709,
+        })
+    }
+
+    /// The profile's own bytes, of RGB pictures.
+    pub fn icc(&self) -> &[u8] {
+        &self.icc
+    }
+
+    /// Linear Rec.709 of a code of 16 bits; negative where that has no such colour.
+    pub fn linear(&self, code: [u16; 3]) -> [f32; 3] {
+        let device = [0, 1, 2].map(|c| f64::from(self.curves[c][usize::from(code[c])]));
+        let linear = self.rec709_from_device * DVec3::from(device);
+        linear.as_vec3().to_array()
+    }
+
+    /// The code of a linear Rec.709 colour, 0 to 1; clamped to what the profile holds.
+    pub fn encoded(&self, linear: [f32; 3]) -> [f64; 3] {
+        let linear = linear.map(|x| if x.is_finite() { f64::from(x) } else { 0.0 });
+        let device = self.device_from_rec709 * DVec3::from(linear);
+        [0, 1, 2].map(|c| {
+            let curve = &self.curves[c];
+            let above = curve.partition_point(|value| f64::from(*value) <= device[c]);
+            let Some(below) = above.checked_sub(1) else {
+                return 0.0;
+            };
+            let next = curve.get(above).map_or(0.0, |next| {
+                let (from, to) = (f64::from(curve[below]), f64::from(*next));
+                (device[c] - from) / (to - from)
+            });
+            (below as f64 + next) / (CODES - 1) as f64
+        })
+    }
+}
+
+impl fmt::Debug for ColourProfile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "ColourProfile({} bytes)", self.icc.len())
+    }
+}
+
+/// `None` where a curve is absent, falls, or leaves 0 to 1.
+fn table(curve: &Option<ToneReprCurve>) -> Option<Vec<f32>> {
+    let curve = curve.as_ref()?.make_linear_evaluator().ok()?;
+    let mut values: Vec<f32> = (0..CODES)
+        .map(|code| curve.evaluate_value(code as f32 / (CODES - 1) as f32))
+        .collect();
+    // The crate's power of 0 is no number.
+    if !(-1e-3..=1.0).contains(&values[0]) {
+        values[0] = 0.0;
+    }
+    let rises = values.windows(2).all(|pair| pair[0] <= pair[1]);
+    let in_range = |x: &f32| (-1e-3..=1.001).contains(x);
+    (rises && values.iter().all(in_range)).then_some(values)
+}
+
+/// No further than a step of 8 bits.
+fn is_within_a_code(curve: &[f32], reference: &[f32]) -> bool {
+    (0..=255).all(|code: usize| {
+        let at = |code: usize| reference[code.min(255) * 257];
+        let low = if code == 0 { -at(1) } else { at(code - 1) };
+        let high = if code == 255 { 1.01 } else { at(code + 1) };
+        (low..=high).contains(&curve[code * 257])
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn display_p3_is_what_the_standard_says() {
+        let icc = ColorProfile::new_display_p3().encode().unwrap();
+        let p3 = ColourProfile::of_icc(icc).unwrap();
+        let encode = |x: f32| (crate::scene::srgb::encode(f64::from(x)) * 255.0).round();
+        let code = [200, 40, 40].map(|c: u16| c * 257);
+        let srgb = p3.linear(code).map(encode);
+        assert_eq!([srgb[0], srgb[2]], [218.0, 26.0]);
+        assert!(p3.linear(code)[1] < 0.0, "outside of Rec.709");
+        for code in [[200, 40, 40], [0, 0, 0], [255, 255, 255], [3, 90, 250]] {
+            let back = p3.encoded(p3.linear(code.map(|c: u16| c * 257)));
+            assert_eq!(back.map(|x| (x * 255.0).round() as u16), code);
+        }
+    }
+
+    #[test]
+    fn srgb_under_any_name_is_none_and_others_are_kept() {
+        let made = |profile: ColorProfile| ColourProfile::of_icc(profile.encode().unwrap());
+        assert_eq!(made(ColorProfile::new_srgb()).unwrap_err(), Unused::IsSrgb);
+        assert_eq!(
+            ColourProfile::of_cicp([1, 13, 0, 1]).unwrap_err(),
+            Unused::IsSrgb
+        );
+        let adobe = made(ColorProfile::new_adobe_rgb()).unwrap();
+        assert!(
+            (adobe.linear([32768; 3])[1] - 0.2177).abs() < 2e-3,
+            "gamma 2.2"
+        );
+        let gray = made(ColorProfile::new_gray_with_gamma(1.8)).unwrap();
+        assert!((gray.linear([32768; 3])[0] - 0.2872).abs() < 2e-3);
+        let again = ColourProfile::of_icc(gray.icc().to_vec()).unwrap();
+        assert_eq!(again.linear([9999; 3]), gray.linear([9999; 3]), "as RGB");
+        let p3 = ColourProfile::of_cicp([12, 13, 0, 1]).unwrap();
+        assert!(p3.linear([51400, 10280, 10280])[1] < 0.0);
+        for refused in [[12, 16, 0, 1], [1, 13, 1, 1], [1, 13, 0, 0], [99, 13, 0, 1]] {
+            assert_eq!(
+                ColourProfile::of_cicp(refused).unwrap_err(),
+                Unused::NotUnderstood
+            );
+        }
+        assert_eq!(
+            ColourProfile::of_icc(vec![7; 200]).unwrap_err(),
+            Unused::NotUnderstood
+        );
+    }
+}

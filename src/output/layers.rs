@@ -1,0 +1,120 @@
+//! Which planes a picture is written with.
+
+use crate::film::{Picture, Planes};
+use crate::scene::Composite;
+
+/// A layer of an EXR file; the composite has no name there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExrLayer {
+    Composite,
+    Mixed,
+    Real,
+    Difference,
+    Albedo,
+    Variance,
+    Normal,
+    Mask,
+    Depth,
+    Samples,
+}
+
+impl ExrLayer {
+    pub const NAMES: [(&str, Self); 10] = [
+        ("composite", Self::Composite),
+        ("difference", Self::Difference),
+        ("mask", Self::Mask),
+        ("depth", Self::Depth),
+        ("normal", Self::Normal),
+        ("albedo", Self::Albedo),
+        ("variance", Self::Variance),
+        ("samples", Self::Samples),
+        ("real", Self::Real),
+        ("mixed", Self::Mixed),
+    ];
+
+    /// What a compositor needs and costs no rays beyond those of the composite.
+    const USUAL: [Self; 7] = [
+        Self::Composite,
+        Self::Difference,
+        Self::Mask,
+        Self::Depth,
+        Self::Normal,
+        Self::Variance,
+        Self::Samples,
+    ];
+}
+
+impl std::str::FromStr for ExrLayer {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        let names = Self::NAMES;
+        match names.iter().find(|(own, _)| *own == name) {
+            Some((_, layer)) => Ok(*layer),
+            None => Err(format!("expected {}", names.map(|(own, _)| own).join(", "))),
+        }
+    }
+}
+
+/// The layers of an EXR file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExrLayers(Vec<ExrLayer>);
+
+impl ExrLayers {
+    /// Those asked for; of none, those that are usual: with the real light where the composite takes it everywhere.
+    pub fn new(asked: &[ExrLayer], composite: Composite) -> Self {
+        if !asked.is_empty() {
+            return Self(asked.to_vec());
+        }
+        let real = (composite == Composite::Quotient).then_some(ExrLayer::Real);
+        Self(ExrLayer::USUAL.into_iter().chain(real).collect())
+    }
+
+    pub fn all() -> Self {
+        Self(ExrLayer::NAMES.map(|(_, layer)| layer).to_vec())
+    }
+
+    /// Real rays are traced where nothing virtual needs them.
+    pub fn need_real_everywhere(&self) -> bool {
+        self.has(ExrLayer::Real) || self.has(ExrLayer::Mixed)
+    }
+
+    /// The first hits of all rays are wanted.
+    pub fn need_guides(&self) -> bool {
+        [ExrLayer::Depth, ExrLayer::Normal, ExrLayer::Albedo]
+            .iter()
+            .any(|layer| self.has(*layer))
+    }
+
+    fn has(&self, layer: ExrLayer) -> bool {
+        self.0.contains(&layer)
+    }
+
+    /// Empties what is not among them, so that it is left out.
+    pub fn pick(&self, picture: &mut Picture, planes: &mut Planes) {
+        let colours = [
+            (ExrLayer::Composite, &mut picture.linear),
+            (ExrLayer::Mixed, &mut planes.mixed),
+            (ExrLayer::Real, &mut planes.real),
+            (ExrLayer::Difference, &mut planes.difference),
+            (ExrLayer::Albedo, &mut planes.albedo),
+            (ExrLayer::Variance, &mut planes.variance),
+            (ExrLayer::Normal, &mut planes.normal),
+        ];
+        for (layer, values) in colours {
+            if !self.has(layer) {
+                values.clear();
+            }
+        }
+        let numbers = [
+            (ExrLayer::Mask, &mut planes.mask),
+            (ExrLayer::Depth, &mut planes.depth),
+            (ExrLayer::Samples, &mut planes.samples),
+        ];
+        for (layer, values) in numbers {
+            if !self.has(layer) {
+                values.clear();
+            }
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! Which frame is which: one rule for the files of a folder, the frames of a stream, and the names in a trajectory.
+//!
+//! The names of a folder are told apart together: all are time stamps, or all end in numbers, or they have their order alone.
+
+/// A frame as its source names it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameName {
+    /// "frame_0012.png", or "frame 12 of standard input".
+    pub label: String,
+    /// The file's path, `/` between folders; `None` in a stream.
+    pub file: Option<String>,
+    /// The number at the end of the file's name; the place where names are time stamps or have no number, and in a stream.
+    pub number: u32,
+    /// From 0, among all frames of the source in their order.
+    pub place: u32,
+    /// The time stamp that is the file's name.
+    pub time_secs: Option<f64>,
+}
+
+impl FrameName {
+    /// Frame `number` of a stream.
+    pub fn of_stream(number: u32, stream: &str) -> Self {
+        Self {
+            label: format!("frame {number} of {stream}"),
+            file: None,
+            number,
+            place: number,
+            time_secs: None,
+        }
+    }
+}
+
+/// What the names of one folder are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Naming {
+    /// Times, so many a second.
+    Stamps(f64),
+    /// A number stands at the end of each.
+    Numbers,
+    /// Their order is all that they tell.
+    Order,
+}
+
+/// Unix time from 2001 to 2096, seconds.
+const EPOCH_SECS: std::ops::Range<f64> = 1e9..4e9;
+/// Whole numbers that are this far apart or more are times, not numbers of frames.
+const LEAST_STEP: u64 = 1000;
+/// Steps from this on are nanoseconds, smaller ones microseconds: between a millisecond and a second either way.
+const LEAST_STEP_NS: u64 = 1_000_000;
+
+impl Naming {
+    /// Of these file names.
+    pub fn of<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Self {
+        let stems = names.map(|name| stem(file_name(name)));
+        if stems.clone().all(is_fraction) {
+            return Self::Stamps(1.0);
+        }
+        let Some(mut numbers) = stems
+            .clone()
+            .map(trailing_digits)
+            .collect::<Option<Vec<u64>>>()
+        else {
+            return Self::Order;
+        };
+        let units = [1e9, 1e6, 1e3];
+        let of_epoch = |unit: &f64| {
+            (numbers.iter()).all(|number| EPOCH_SECS.contains(&(*number as f64 / unit)))
+        };
+        if let Some(unit) = units.into_iter().find(of_epoch) {
+            return Self::Stamps(unit);
+        }
+        numbers.sort_unstable();
+        let least = numbers.windows(2).map(|pair| pair[1] - pair[0]).min();
+        let are_whole = stems
+            .clone()
+            .all(|stem| stem.bytes().all(|b| b.is_ascii_digit()));
+        match least.filter(|least| are_whole && *least >= LEAST_STEP) {
+            Some(LEAST_STEP_NS..) => Self::Stamps(1e9),
+            Some(_) => Self::Stamps(1e6),
+            None if numbers.last().is_some_and(|n| u32::try_from(*n).is_ok()) => Self::Numbers,
+            None => Self::Order,
+        }
+    }
+
+    /// Seconds, of a name that is a time stamp.
+    pub fn time_secs(self, name: &str) -> Option<f64> {
+        let Self::Stamps(unit) = self else {
+            return None;
+        };
+        let stem = stem(file_name(name));
+        match is_fraction(stem) {
+            true => stem.parse().ok(),
+            false => Some(trailing_digits(stem)? as f64 / unit),
+        }
+    }
+
+    /// The number at the end of a name.
+    pub fn number(self, name: &str) -> Option<u32> {
+        match self {
+            Self::Numbers => u32::try_from(trailing_digits(stem(file_name(name)))?).ok(),
+            Self::Stamps(_) | Self::Order => None,
+        }
+    }
+
+    /// These names in order: of time, of numbers, or of letters.
+    pub fn sort<T>(self, named: &mut [(String, T)]) {
+        named.sort_by(|(a, _), (b, _)| {
+            let by_time = || {
+                let (a, b) = (self.time_secs(a)?, self.time_secs(b)?);
+                Some(a.total_cmp(&b))
+            };
+            let order = by_time().unwrap_or_else(|| self.number(a).cmp(&self.number(b)));
+            order.then_with(|| a.cmp(b))
+        });
+    }
+}
+
+pub(super) fn file_name(path: &str) -> &str {
+    path.rsplit_once('/').map_or(path, |(_, name)| name)
+}
+
+/// Without the extension; what follows the point of a fraction is none.
+pub(super) fn stem(file: &str) -> &str {
+    match file.rsplit_once('.') {
+        Some((stem, extension)) if !extension.bytes().all(|b| b.is_ascii_digit()) => stem,
+        _ => file,
+    }
+}
+
+fn is_fraction(stem: &str) -> bool {
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    (stem.split_once('.')).is_some_and(|(whole, fraction)| digits(whole) && digits(fraction))
+}
+
+fn trailing_digits(stem: &str) -> Option<u64> {
+    let before = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+    stem[before.len()..].parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_times_numbers_or_in_order() {
+        let naming = |names: &[&str]| Naming::of(names.iter().copied());
+        assert_eq!(
+            naming(&["0.000000.png", "0.033300.png"]),
+            Naming::Stamps(1.0)
+        );
+        let ns = ["1403636579763555584.png", "1403636579813555456.png"];
+        assert_eq!(naming(&ns), Naming::Stamps(1e9));
+        let secs = naming(&ns).time_secs(ns[1]).expect("a stamp");
+        assert!((secs - 1_403_636_579.813_555_5).abs() < 1e-6, "{secs}");
+        assert_eq!(naming(&["left_1403636579763555.jpg"]), Naming::Stamps(1e6));
+        assert_eq!(naming(&["1403636579763.jpg"]), Naming::Stamps(1e3));
+        assert_eq!(
+            naming(&["000000.png", "033300.png", "066700.png"]),
+            Naming::Stamps(1e6)
+        );
+        assert_eq!(naming(&["0.png", "33300000.png"]), Naming::Stamps(1e9));
+        assert_eq!(naming(&["0.png", "10.png", "20.png"]), Naming::Numbers);
+        assert_eq!(
+            naming(&["shot1.0001.exr", "shot1.0002.exr"]),
+            Naming::Numbers
+        );
+        assert_eq!(
+            naming(&["f_0000.png", "f_5000.png"]),
+            Naming::Numbers,
+            "not whole"
+        );
+        assert_eq!(naming(&["IMG_20260101123456.jpg"]), Naming::Order, "a date");
+        assert_eq!(naming(&["a.png", "b.png"]), Naming::Order);
+    }
+
+    #[test]
+    fn numbers_without_leading_zeros_are_in_order() {
+        let mut names = ["f_10.png", "f_9.png"].map(|name| (name.to_owned(), ()));
+        Naming::Numbers.sort(&mut names);
+        assert_eq!(names[0].0, "f_9.png");
+        Naming::Order.sort(&mut names);
+        assert_eq!(names[0].0, "f_10.png", "control");
+    }
+}

@@ -1,0 +1,220 @@
+//! Where a frame's intrinsics come from.
+
+use super::support::{FOCAL_PX, ball, centroid};
+use crate::support::Folder;
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    folder.write("scene.toml", ball(0.2));
+    folder.grey_frames(&["f_0000.png"]);
+    folder
+}
+
+/// Parts of a transforms.json: what is said of all frames, and of the one frame.
+fn transforms(folder: &Folder, top: &str, frame: &str) {
+    folder.write(
+        "transforms.json",
+        format!(
+            r#"{{{top} "frames": [{{{frame} "file_path": "images/f_0000.png", "transform_matrix": [[1,0,0,0.9],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}}]}}"#
+        ),
+    );
+}
+
+#[test]
+fn ns_perframe_dist() {
+    let folder = folder();
+    let focal = format!(
+        r#""w": 64, "h": 48, "fl_x": {FOCAL_PX}, "fl_y": {FOCAL_PX}, "cx": 32.0, "cy": 24.0,"#
+    );
+    let k1 = r#""k1": 0.8, "k2": 0.0, "p1": 0, "p2": 0, "camera_model": "OPENCV","#;
+    let render = |top: &str, frame: &str| {
+        transforms(&folder, top, frame);
+        folder.sequence_of("frames", "transforms.json", "");
+        (folder.ball_at("f_0000.png"), folder.bytes("out/f_0000.png"))
+    };
+    // x' = x (1 + 0.8 x^2) at x = -0.3 / 1, of the ball's centre: 32 - 65.9 * 0.3 * 1.072.
+    let (split, bytes) = render(k1, &focal);
+    assert!((split[0] - 10.6).abs() < 0.4, "{split:?}");
+    assert_eq!(
+        bytes,
+        render("", &format!("{k1}{focal}")).1,
+        "in the frame alone"
+    );
+    assert_eq!(
+        bytes,
+        render(&format!("{k1}{focal}"), "").1,
+        "at the top alone"
+    );
+    let (straight, _) = render("", &focal);
+    assert!((straight[0] - 12.2).abs() < 0.4, "control: {straight:?}");
+    // The frame's own wins.
+    let (own, _) = render(&k1.replace("0.8", "0.3"), &format!(r#""k1": 0.8, {focal}"#));
+    assert_eq!(own, split);
+}
+
+#[test]
+fn fields_of_view_stand_in_for_focal_lengths() {
+    let folder = folder();
+    let angle = 2.0 * (32.0 / FOCAL_PX).atan();
+    let fov = format!(r#""camera_angle_x": {angle},"#);
+    let render = |top: &str, frame: &str| {
+        transforms(&folder, top, frame);
+        folder.sequence_of("frames", "transforms.json", "");
+        folder.ball_at("f_0000.png")[0]
+    };
+    let straight = render(
+        "",
+        &format!(r#""w": 64, "h": 48, "fl_x": {FOCAL_PX}, "cx": 32.0, "cy": 24.0,"#),
+    );
+    assert!(
+        (render(&fov, "") - straight).abs() < 0.02,
+        "no size is told"
+    );
+    assert!((render(&format!(r#""w": 64, "h": 48,{fov}"#), "") - straight).abs() < 0.02);
+    let wider = render(&fov.replace(&angle.to_string(), "1.2"), "");
+    assert!((wider - straight).abs() > 1.0, "control: another angle");
+    transforms(&folder, r#""k1": 0.1,"#, "");
+    folder.refuse_sequence_of("frames", "transforms.json", "lack `fl_x`");
+    transforms(&folder, r#""fl_x": 60, "cy": 24,"#, "");
+    folder.refuse_sequence_of("frames", "transforms.json", "lack `cx`");
+}
+
+/// The rule of this program's own formats too.
+#[test]
+fn own_formats_take_fields_from_the_top() {
+    let folder = folder();
+    let pose = "[[1,0,0,0.9],[0,1,0,0],[0,0,1,3],[0,0,0,1]]";
+    folder.write(
+        "poses.json",
+        format!(
+            r#"{{"camera": {{"cx": 32, "cy": 24, "distortion": [0.8, 0, 0, 0, 0]}},
+            "frames": [{{"frame": 0, "camera": {{"fx": {FOCAL_PX}, "fy": {FOCAL_PX}}}, "world_from_camera": {pose}}}]}}"#
+        ),
+    );
+    folder.write(
+        "poses.toml",
+        format!(
+            "[camera]\ncx = 32\ncy = 24\ndistortion = [0.8, 0, 0, 0, 0]\n[[frame]]\nframe = 0\nworld_from_camera = {pose}\ncamera = {{ fx = {FOCAL_PX} }}\n"
+        ),
+    );
+    for poses in ["poses.json", "poses.toml"] {
+        folder.sequence_of("frames", poses, "");
+        let x = folder.ball_at("f_0000.png")[0];
+        assert!((x - 10.6).abs() < 0.4, "{poses}: {x}");
+    }
+    let toml = folder.read("poses.toml");
+    folder.write("poses.toml", toml.replace("fx =", "fy ="));
+    folder.sequence_of("frames", "poses.toml", "");
+    folder.write("poses.toml", toml.replace("cx = 32\n", ""));
+    folder.refuse_sequence_of("frames", "poses.toml", "lack `cx`");
+}
+
+/// A ball 45 degrees to the left: equidistant at 32 - 20 pi / 4, pinhole at 32 - 20.
+const EQUIDISTANT: f64 = 32.0 - 5.0 * std::f64::consts::PI;
+
+fn wide_folder() -> Folder {
+    let folder = Folder::new();
+    folder.write("scene.toml", ball(0.4));
+    folder.grey_frames(&["f_0000.png"]);
+    folder
+}
+
+#[test]
+fn ngp_fisheye_wide() {
+    let folder = wide_folder();
+    let transforms = |model: &str| {
+        folder.write(
+            "transforms.json",
+            format!(
+                r#"{{{model} "w": 64, "h": 48, "fl_x": 20.0, "fl_y": 20.0, "cx": 32.0, "cy": 24.0, "k1": 0.0, "k2": 0.0,
+                "frames": [{{"file_path": "images/f_0000.png", "transform_matrix": [[1,0,0,3],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}}]}}"#
+            ),
+        );
+    };
+    for model in [
+        r#""is_fisheye": true,"#,
+        r#""camera_model": "OPENCV_FISHEYE","#,
+        r#""distortion_model": "equidistant","#,
+    ] {
+        for backend in ["cpu", "gpu"] {
+            transforms(model);
+            folder.sequence_of("frames", "transforms.json", &format!("--backend {backend}"));
+            let x = folder.ball_at("f_0000.png")[0];
+            assert!(
+                (x - EQUIDISTANT).abs() < 0.5,
+                "{model} on the {backend}: {x}"
+            );
+        }
+    }
+    transforms("");
+    folder.sequence_of("frames", "transforms.json", "");
+    let x = folder.ball_at("f_0000.png")[0];
+    assert!((x - EQUIDISTANT).abs() > 3.0, "control: a pinhole, {x}");
+    transforms(r#""camera_model": "EQUIRECTANGULAR","#);
+    folder.refuse_sequence_of("frames", "transforms.json", "EQUIRECTANGULAR");
+    transforms(r#""k4": 0.1,"#);
+    folder.refuse_sequence_of("frames", "transforms.json", "k4 is 0.1");
+}
+
+#[test]
+fn cv_ros_fisheye_wide() {
+    let folder = wide_folder();
+    folder.write("t.txt", "0.0 3 0 -3 0 0 0 1\n");
+    let calibration = |model: &str, coefficients: &str| {
+        folder.write(
+            "calib.yaml",
+            format!(
+                "image_width: 64\nimage_height: 48\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [20.0, 0, 31.5, 0, 20.0, 23.5, 0, 0, 1]\n\
+                 {model}\ndistortion_coefficients:\n  rows: 1\n  cols: 4\n  data: [{coefficients}]\n"
+            ),
+        );
+    };
+    let x = || {
+        folder.sequence_of("frames", "t.txt", "--intrinsics calib.yaml");
+        folder.ball_at("f_0000.png")[0]
+    };
+    for model in ["distortion_model: equidistant", "fisheye_model: 1"] {
+        calibration(model, "0.0, 0.0, 0.0, 0.0");
+        let x = x();
+        assert!((x - EQUIDISTANT).abs() < 0.5, "{model}: {x}");
+    }
+    // The first sample of a rational model: at r = 1 the radius is 1.2 / 1.5.
+    calibration(
+        "distortion_model: rational_polynomial",
+        "0.2, 0, 0, 0, 0, 0.5, 0, 0",
+    );
+    let rational = x();
+    assert!((rational - 16.0).abs() < 0.7, "{rational}");
+    calibration("distortion_model: plumb_bob", "0.0, 0.0, 0.0, 0.0, 0.0");
+    assert!((x() - EQUIDISTANT).abs() > 3.0, "control: a pinhole");
+    calibration("distortion_model: unified", "0.0, 0.0, 0.0, 0.0");
+    let command =
+        "sequence scene.toml --frames frames --trajectory t.txt --intrinsics calib.yaml -o out";
+    folder.refuse(command, "unified");
+}
+
+/// In a scene file, and in the picture that a render writes.
+#[test]
+fn fisheyes_of_scene_files() {
+    let folder = Folder::new();
+    let scene = |lens: &str| {
+        ball(0.4).replace(
+            "[camera]\n",
+            &format!("[camera]\nwidth = 64\nheight = 48\nfx = 20\nposition = [3, 0, 3]\nlook_at = [3, 0, 0]\n{lens}\n"),
+        )
+    };
+    let x = |lens: &str| {
+        folder.write("scene.toml", scene(lens));
+        folder.succeed("render scene.toml -o out.png");
+        centroid(&folder.open("out.png"))[0]
+    };
+    assert!((x("lens_model = \"fisheye\"") - EQUIDISTANT).abs() < 0.5);
+    let bent = x("lens_model = \"fisheye\"\ndistortion = [0.1, 0, 0, 0]");
+    assert!(bent < EQUIDISTANT - 0.5, "{bent}");
+    assert!((x("") - EQUIDISTANT).abs() > 3.0, "control");
+    let open = "lens_model = \"fisheye\"\n[lens]\naperture_radius_m = 0.01\nfocus_distance_m = 3";
+    folder.write("scene.toml", scene(open));
+    folder.refuse("render scene.toml -o out.png", "89 degrees");
+    folder.write("scene.toml", scene(open).replace("fx = 20", "fx = 28"));
+    folder.succeed("render scene.toml -o out.png");
+}
