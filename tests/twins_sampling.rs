@@ -4,6 +4,7 @@ use bytemuck::Zeroable;
 use glam::{DMat4, DVec3, Vec3};
 use mixray::camera::lens::{camera_project, camera_ray, sample_lens};
 use mixray::camera::sampler::{MAX_TOTAL, SampleKey, sample_4d};
+use mixray::distortion::LENS_RADIAL;
 use mixray::gpu::harness::{Probe, test_device};
 use mixray::gpu::{Features, SceneBuffers, SceneParts};
 use mixray::math::*;
@@ -30,6 +31,7 @@ fn on_gpu<const N: usize, const M: usize>(
         features: Features {
             // Without a lens the pinhole variant is the one that is tested.
             lens: frame.is_some_and(|frame| frame.aperture_radius > 0.0),
+            lens_models: frame.is_some_and(|frame| frame.lens_model != LENS_RADIAL),
             ..Features::default()
         },
         prelude,

@@ -296,7 +296,6 @@ fn path_pdf(st: ptr<function, PathState>, s: Surface, direction: vec3<f32>, bsdf
 
 fn path_sample(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, u: vec3<f32>, share: f32) -> BsdfSample {
     var b = bsdf_sample(s, wo, u);
-    @if(!guide) { return b; }
     if share == 0.0 { return b; }
     let by_guide = draw(st, SET_DIFFERENCE_CONE);
     if third(by_guide) < share {
@@ -329,9 +328,9 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
     var lobe = 0.0;
     if !bsdf_is_lambertian(s) { lobe = third(u); }
     let v = vec3<f32>(lobe, pair(u));
-    var share = 0.0;
-    @if(guide) { share = guided_share(st, s); }
-    let b = path_sample(st, s, wo, v, share);
+    @if(guide) let share = guided_share(st, s);
+    @if(guide) let b = path_sample(st, s, wo, v, share);
+    @if(!guide) let b = bsdf_sample(s, wo, v);
     if !b.valid { return; }
     let throughput = (*st).path.throughput * b.weight;
     let medium = medium_along(st, s, b.wi);

@@ -13,9 +13,9 @@ import package::packed::records::{Frame, Light, PixelInfo, TextureRef, Triangle,
 @group(0) @binding(7) var<storage, read> env_texels: array<f32>;
 @group(0) @binding(8) var<storage, read> env_cdf: array<f32>;
 @group(0) @binding(9) var<storage, read> photo_albedo: array<vec4<f32>>;
-@group(0) @binding(10) var<storage, read> pixels: array<PixelInfo>;
-@group(0) @binding(11) var<storage, read> bvh_nodes: array<vec4<u32>>;
-@group(0) @binding(12) var<storage, read> bvh_leaves: array<vec4<f32>>;
-@group(0) @binding(13) var<storage, read> guide: array<vec4<f32>>;
-@group(0) @binding(14) var<storage, read> backdrop: array<f32>;
-@group(0) @binding(15) var<storage, read> facet_tables: array<f32>;
+@group(0) @binding(10) var<storage, read> guide: array<vec4<f32>>;
+@group(0) @binding(11) var<storage, read> backdrop: array<f32>;
+@group(0) @binding(12) var<storage, read> facet_tables: array<f32>;
+@group(0) @binding(13) var<storage, read> pixels: array<PixelInfo>;
+@group(0) @binding(14) var<storage, read> bvh_nodes: array<vec4<u32>>;
+@group(0) @binding(15) var<storage, read> bvh_leaves: array<vec4<f32>>;

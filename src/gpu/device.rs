@@ -164,6 +164,8 @@ impl GpuDevice {
         let offered = adapter.limits();
         let limits = wgpu::Limits {
             max_storage_buffers_per_shader_stage: offered.max_storage_buffers_per_shader_stage,
+            max_buffers_and_acceleration_structures_per_shader_stage: offered
+                .max_buffers_and_acceleration_structures_per_shader_stage,
             max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
             max_buffer_size: offered.max_buffer_size,
             max_uniform_buffer_binding_size: offered.max_uniform_buffer_binding_size,

@@ -3,6 +3,7 @@
 //! microfacet models"): white metal and clear glass then lose nothing, and coloured metal saturates. WGSL twin: `shaders/material/facets.wgsl`.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::fresnel::{RelativeIndex, fresnel_dielectric, refract_about, relative_index};
 use super::ggx::{DELTA_ALPHA, ggx_sample_half, smith_l};
@@ -18,7 +19,7 @@ shared! {
 }
 
 /// Facets of an entry's quadrature, in either direction.
-const FACETS: u32 = 24;
+const FACETS: u32 = 48;
 /// Cosines are taken as no smaller than this.
 const LEAST_COSINE: f32 = 1e-3;
 
@@ -37,10 +38,12 @@ pub fn table_of(ior: Option<f32>) -> Vec<f32> {
         let alpha = (roughness * roughness).max(DELTA_ALPHA);
         kept(alpha, (root * root).max(LEAST_COSINE), index)
     };
-    sides
-        .into_iter()
-        .flat_map(|index| (0..TABLE_SIZE).map(move |i| (i, index)))
-        .map(|(i, index)| entry(i, index))
+    (sides.into_par_iter())
+        .flat_map(|index| {
+            (0..TABLE_SIZE)
+                .into_par_iter()
+                .map(move |i| entry(i, index))
+        })
         .collect()
 }
 

@@ -9,6 +9,7 @@ use crate::film::{
     Combined, Film, GROUPS, Picture, Planes, combine_robustly, composite, estimated_error,
     filter_difference, filter_finally, group_counts, planes,
 };
+use crate::scene::Composite;
 
 /// What is delivered of a film.
 #[derive(Clone, Debug)]
@@ -36,7 +37,11 @@ impl Renderer {
     /// The picture as it is delivered: with the scene's combination of samples, or filtered.
     pub fn delivered(&self) -> Delivered {
         let film = &self.core.film;
-        let photo = self.core.scene.photo.as_ref();
+        // A quotient multiplies the photograph, whose grain would come into the difference as well.
+        let photo = match self.core.scene.settings.composite {
+            Composite::Additive => self.core.scene.photo.as_ref(),
+            Composite::Quotient => None,
+        };
         let counts = |pixel| self.group_counts(pixel);
         let (picture, moved) = match self.core.options.filter {
             Some(Filter::Final) => {

@@ -274,8 +274,12 @@ impl<R: Read> Y4mReader<R> {
         read(MARKER.len(), &mut next)?;
         self.frames += 1;
         let lost = |there: usize| {
+            let what = match there < wanted {
+                true => format!("it is truncated: frame {number} has {there} of {wanted} bytes"),
+                false => format!("frame {} does not begin with FRAME", number + 1),
+            };
             format!(
-                "it is truncated: frame {number} has {there} of {wanted} bytes; expected whole frames; make the stream again, or let such frames pass with --damaged-frames pass; then go on with the same command"
+                "{what}; expected whole frames; make the stream again, or let such frames pass with --damaged-frames pass; then go on with the same command"
             )
         };
         if planes.len() < wanted {

@@ -45,6 +45,8 @@ each_case! {
     paper_plain,
     paper_with_everything,
     camera_in_motion,
+    fisheye,
+    a_rational_lens_wide_open,
     direct_with_everything,
 }
 

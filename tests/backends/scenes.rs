@@ -93,6 +93,29 @@ aperture = 5
 blade_rotation_deg = 11
 ";
 
+/// It sees what lies behind it in its corners.
+const FISHEYE_CAMERA: &str = "
+[camera]
+width = 48
+height = 36
+fx = 17.0
+lens_model = \"fisheye\"
+distortion = [0.02, -0.01, 0.003, -0.001]
+position = [0.1, 0.6, 1.2]
+look_at = [0, 0.2, 0]
+";
+/// With thin prisms.
+const RATIONAL_CAMERA: &str = "
+[camera]
+width = 48
+height = 36
+fx = 46.0
+lens_model = \"opencv\"
+distortion = [0.3, 0.1, 0.002, -0.003, 0.01, 0.4, 0.15, 0.02, 0.001, -0.002, 0.0015, 0.001]
+position = [0, 0.5, 2.2]
+look_at = [0, 0.25, 0]
+";
+
 /// Steps, turns, and reads its rows one after the other.
 const MOVING_CAMERA: &str = "
 [camera]
@@ -506,6 +529,18 @@ pub const CASES: &[Case] = &[
         ],
         settings: "max_bounces = 1\nsampler = \"cmj\"",
         all_planes: false,
+    },
+    Case {
+        name: "fisheye",
+        parts: &[FISHEYE_CAMERA, FLAT_SKY, GLOSSY_FLOOR, METAL_BALL, QUAD],
+        settings: "max_bounces = 2",
+        all_planes: true,
+    },
+    Case {
+        name: "a_rational_lens_wide_open",
+        parts: &[RATIONAL_CAMERA, DISC_LENS, FLAT_SKY, MATT_FLOOR, MATT_BALL],
+        settings: "max_bounces = 2",
+        all_planes: true,
     },
     Case {
         name: "direct_with_everything",

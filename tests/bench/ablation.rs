@@ -16,8 +16,8 @@ fn each_saving_has_its_rows() {
     let shown = folder.succeed(&format!("{} --goal-rpp 64", of("ablate")));
     let report = folder.json("out/results.json");
     let rows = report["rows"].as_array().unwrap();
-    // paper, direct, and direct without nine savings, at two counts of rays; two goals with their savings and without.
-    assert_eq!(rows.len(), 2 * (2 + 9) + 2 * 2);
+    // paper, direct, and direct without ten savings, at two counts of rays; two goals with their savings and without.
+    assert_eq!(rows.len(), 2 * (2 + 10) + 2 * 2);
     for (name, _) in Skip::CHOICES {
         let has_row = rows.iter().any(|row| row["without"] == *name);
         assert_eq!(has_row, *name != "specialisation", "{name}");

@@ -43,7 +43,7 @@ fn judge(model: &Path, output: &Output, out: &Path) -> Result<Outcome, String> {
     let stderr = String::from_utf8_lossy(&output.stderr);
     let (warnings, rest): (Vec<&str>, Vec<&str>) = stderr
         .lines()
-        .partition(|line| line.starts_with("warning: "));
+        .partition(|line| line.starts_with("warning: ") || line.starts_with("note: "));
     if warnings.iter().any(|line| line.contains("not finite")) {
         return Err(format!("not finite: {stderr}"));
     }

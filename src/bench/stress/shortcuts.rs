@@ -101,9 +101,9 @@ pub(super) fn moved_photons(backend: &mut Backend, at: At) -> Result<Measured, S
 
 /// The mirror is so large that about so many of the pilot's photons are seen. Control: a sun three times brighter.
 pub(super) fn few_pilot_photons(backend: &mut Backend, at: At) -> Result<Measured, StressError> {
-    // With the least mirror a thousand of them are.
-    let half = 13.0 * (1e3 / at.value).sqrt();
-    let scene = lit_from_behind(half, if at.control { 3.0 } else { 1.0 }, 4 * rays(at));
+    // With the least mirror 55 of them are: the wall's share of the mirror's bounding sphere, and a fifth of what the lens may see.
+    let half = 13.0 * (55.0 / at.value).sqrt();
+    let scene = lit_from_behind(half, if at.control { 3.0 } else { 1.0 }, 8 * rays(at));
     of_the_wall(backend, &scene)
 }
 

@@ -86,10 +86,17 @@ impl Expected {
         }
     }
 
-    /// Small lamps that are seen in smooth objects raise the rate where they are, and lower it nowhere: they take few pixels.
-    fn with_highlights(mut self) -> Self {
-        self.mixed.error += self.highlight;
-        self
+    /// Small lamps that are seen in smooth objects raise the rate where they are, and lower it nowhere: they take few pixels. `even` is the gain that
+    /// takes one sample a ray, all in all.
+    fn with_highlight(&self, rates: Rates, even: f32) -> Rates {
+        let rate = even * ((self.mixed.error + self.highlight) / self.mixed.cost).sqrt();
+        match self.highlight > 0.0 {
+            true => Rates {
+                mixed: rates.mixed.max(rate.min(LARGEST_FACTOR)),
+                ..rates
+            },
+            false => rates,
+        }
     }
 
     fn mean(&self, difference: f32, mixed: f32) -> f32 {
@@ -143,8 +150,14 @@ pub fn allocate(
         error <= ERROR_SHARE * error_of_one || samples >= expected.len() as f32
     };
     let gain = least_gain(is_enough);
-    (expected.into_iter())
-        .map(|e| e.with_highlights().rates(gain))
+    let root = |e: &Expected| {
+        let error = e.mean(e.difference.error, e.mixed.error);
+        (error / e.mean(e.difference.cost, e.mixed.cost)).sqrt()
+    };
+    let roots: f32 = expected.iter().map(root).sum();
+    let even = gain.max(expected.len() as f32 / roots.max(f32::MIN_POSITIVE));
+    (expected.iter())
+        .map(|e| e.with_highlight(e.rates(gain), even))
         .collect()
 }
 

@@ -138,7 +138,6 @@ fn highlights_raise_the_rate_where_they_are() {
             error: 0.01,
             cost: 4.0,
         };
-        m.near_share = 1.0;
     }
     let nowhere = vec![0.0; blocks.count()];
     let mut somewhere = nowhere.clone();

@@ -188,7 +188,6 @@ const TRACES: &[Trace] = &[
         kernel: "kernel_generate",
         with: &[
             "fn camera_lens__sample_lens",
-            "gpu_buffers__frame.aperture_radius",
             "gpu_buffers__frame.inv_focus_distance",
         ],
         ..ADVANCE

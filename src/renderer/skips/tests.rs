@@ -39,9 +39,9 @@ fn each_switch_takes_back_its_own() {
 #[test]
 fn only_what_may_show_is_kept_with_films_and_pictures() {
     let all: Without = Skip::CHOICES.iter().map(|&(_, skip)| skip).collect();
-    let of_pictures = "plan,beams,cones,sharing,last-vertex,photons";
+    let of_pictures = "plan,beams,cones,sharing,last-vertex,photons,guide";
     assert_eq!(all.of_pictures(false).names(), of_pictures);
-    let of_films = "out-of-reach,plan,beams,edge-real,cones,sharing,last-vertex,photons";
+    let of_films = "out-of-reach,plan,beams,edge-real,cones,sharing,last-vertex,photons,guide";
     assert_eq!(all.of_films(false).names(), of_films);
     let on_gpu = format!("{of_films},specialisation");
     assert_eq!(all.of_films(true).names(), on_gpu);

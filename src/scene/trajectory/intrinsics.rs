@@ -101,7 +101,7 @@ pub(super) enum LensModel {
 }
 
 impl LensModel {
-    const NAMES: [(&str, Self); 17] = [
+    const NAMES: [(&str, Self); 21] = [
         ("OPENCV", Self::Radial),
         ("PINHOLE", Self::Radial),
         ("SIMPLE_PINHOLE", Self::Radial),
@@ -110,6 +110,10 @@ impl LensModel {
         ("PERSPECTIVE", Self::Radial),
         ("PLUMB_BOB", Self::Radial),
         ("RADTAN", Self::Radial),
+        ("RADIAL_TANGENTIAL", Self::Radial),
+        ("BROWN", Self::Radial),
+        ("BROWN_CONRADY", Self::Radial),
+        ("RATIONAL", Self::Rational),
         ("NONE", Self::Radial),
         ("FULL_OPENCV", Self::Rational),
         ("RATIONAL_POLYNOMIAL", Self::Rational),
@@ -123,8 +127,11 @@ impl LensModel {
 
     /// Of a name as a file has it.
     pub(super) fn named(name: &str) -> Result<Self, String> {
-        let upper = name.to_ascii_uppercase();
-        let found = Self::NAMES.iter().find(|(own, _)| *own == upper);
+        let upper = name.to_ascii_uppercase().replace([' ', '-'], "_");
+        let short = upper.strip_prefix("OPENCV_").unwrap_or(&upper);
+        let found = Self::NAMES
+            .iter()
+            .find(|(own, _)| *own == upper || *own == short);
         found.map(|(_, model)| *model).ok_or_else(|| {
             format!(
                 "the camera model {name} is not known; expected OpenCV's pinhole (OPENCV, FULL_OPENCV) or fisheye (OPENCV_FISHEYE); undistort the frames"
