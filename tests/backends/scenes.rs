@@ -100,7 +100,7 @@ width = 48
 height = 36
 fx = 17.0
 lens_model = \"fisheye\"
-distortion = [0.02, -0.01, 0.003, -0.001]
+distortion = [0.02, -0.01, 0.003, -0.0001]
 position = [0.1, 0.6, 1.2]
 look_at = [0, 0.2, 0]
 ";
