@@ -12,6 +12,7 @@ import argparse
 import json
 import pathlib
 import re
+import resource
 import subprocess
 import sys
 import tempfile
@@ -155,6 +156,11 @@ def render(folder, print_board, poses, seed, side=4):
 # Both programs
 
 
+def processor_secs():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 class Mixray:
     def __init__(self, program, folder):
         self.program, self.folder = program, folder
@@ -162,12 +168,12 @@ class Mixray:
     def track(self, video, *flags):
         poses, report = self.folder / "poses.json", self.folder / "track.json"
         line = [self.program, "track", str(video), "-o", str(poses), "--report", str(report), *map(str, flags)]
-        start = time.monotonic()
+        start = processor_secs()
         done = subprocess.run(line, capture_output=True, text=True)
         if done.returncode != 0:
             sys.exit(f"{' '.join(line)}\n{done.stderr}")
         found = json.loads(report.read_text())
-        found["secs"] = time.monotonic() - start
+        found["secs"] = processor_secs() - start
         camera, k = found["camera"], found["camera"]["distortion"]
         found["k"] = np.array([[camera["fx"], 0, camera["cx"] - 0.5], [0, camera["fy"], camera["cy"] - 0.5], [0, 0, 1]])
         found["d"] = np.array([k["k1"], k["k2"], k["p1"], k["p2"], k["k3"]])
@@ -380,7 +386,7 @@ def measure(mixray, data, folder):
     start = time.thread_time()
     aruco_markers([cv2.cvtColor(f, cv2.COLOR_BGR2GRAY) for f in frames], dictionary, 3)
     peer_ms = 1e3 * (time.thread_time() - start) / len(frames)
-    row("time a frame, one thread, all of it", "15 ms", milliseconds, f"{milliseconds:.1f} ms", f"{peer_ms:.1f} ms (detection)", lambda v: v <= 15)
+    row("processor time a frame, all of it", "15 ms", milliseconds, f"{milliseconds:.1f} ms", f"{peer_ms:.1f} ms (detection)", lambda v: v <= 15)
 
     truth = views(36, 1, lambda _, random: random.uniform(0.42, 0.75))
     render(folder / "sgrid", lambda x, z: printed(x, z, binary_marker(codes)), truth, 2, 6)

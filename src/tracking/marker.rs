@@ -252,3 +252,37 @@ fn sharpen(values: &mut [f32], n: usize, cell_px: f64) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sharpening_undoes_the_blur_between_small_cells() {
+        let n = 5;
+        let white = |x: usize, y: usize| f32::from(u8::from((x * 3 + y * 5) % 4 < 2));
+        let lost = 0.14;
+        let at = |x: i32, y: i32| match (0..5).contains(&x) && (0..5).contains(&y) {
+            true => white(x as usize, y as usize),
+            false => 0.0,
+        };
+        let across =
+            |x: i32, y: i32| (1.0 - 2.0 * lost) * at(x, y) + lost * (at(x - 1, y) + at(x + 1, y));
+        let blurred = |x: i32, y: i32| {
+            (1.0 - 2.0 * lost) * across(x, y) + lost * (across(x, y - 1) + across(x, y + 1))
+        };
+        let cells = (0..5).flat_map(|y| (0..5).map(move |x| (x, y)));
+        let mut values: Vec<f32> = cells.map(|(x, y)| blurred(x, y)).collect();
+        let worst = |values: &[f32]| {
+            let off = (0..n * n).map(|k| (values[k] - white(k % n, k / n)).abs());
+            off.fold(0.0, f32::max)
+        };
+        let before = worst(&values);
+        sharpen(&mut values, n, 1.95);
+        assert!(
+            before > 0.3 && worst(&values) < 0.15,
+            "{before} {}",
+            worst(&values)
+        );
+    }
+}

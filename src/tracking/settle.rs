@@ -45,3 +45,48 @@ pub fn settle(frames: &[Option<&Minima>]) -> Vec<Result<(Fit, bool), String>> {
     });
     each.collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, DVec3};
+    use nalgebra::Matrix6;
+
+    use super::super::pose::Pose;
+    use super::*;
+
+    fn fit(angle: f64, cost: f64) -> Fit {
+        Fit {
+            pose: Pose {
+                rotation: DMat3::from_rotation_x(angle),
+                translation: DVec3::Z,
+            },
+            cost,
+            information: Matrix6::identity(),
+        }
+    }
+
+    fn minima(best: f64, other: f64, margin: f64) -> Minima {
+        Minima {
+            best: fit(best, 1.0),
+            other: Some(fit(other, 1.0 + margin)),
+        }
+    }
+
+    #[test]
+    fn neighbours_tell_the_mirror_from_the_pose() {
+        let clear = minima(0.5, -0.5, 100.0);
+        let mirrored = minima(-0.48, 0.52, 2.0);
+        let settled = settle(&[Some(&clear), Some(&mirrored), None]);
+        let (first, by_neighbours) = settled[0].clone().unwrap();
+        assert!(first.pose.angle_to(&clear.best.pose) < 1e-12 && !by_neighbours);
+        let (second, by_neighbours) = settled[1].clone().unwrap();
+        assert!(second.cost == 3.0 && by_neighbours);
+        assert!(settled[2].is_err());
+        // Nothing decided nearby: none is meant.
+        assert!(
+            settle(&[Some(&mirrored), Some(&mirrored)])
+                .iter()
+                .all(Result::is_err)
+        );
+    }
+}

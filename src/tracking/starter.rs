@@ -52,7 +52,7 @@ impl Session {
             line(format_args!("world_from_camera = [{}]\n", rows.join(", ")));
         }
         line(format_args!(
-            "\n[environment]                           # the light of the place: replace it by a light probe\nradiance = [0.6, 0.6, 0.6]\n\n[[light]]\nkind = \"quad\"\ncorner = [{:.3}, {:.3}, {:.3}]\nedge_u = [{extent:.3}, 0.0, 0.0]\nedge_v = [0.0, 0.0, {extent:.3}]                # u x v points down\nradiance = [4.0, 4.0, 4.0]\n",
+            "\n[environment]                           # the light of the place: replace it by a light probe\nradiance = [0.3, 0.3, 0.3]\n\n[[light]]\nkind = \"quad\"\ncorner = [{:.3}, {:.3}, {:.3}]\nedge_u = [{extent:.3}, 0.0, 0.0]\nedge_v = [0.0, 0.0, {extent:.3}]                # u x v points down\nradiance = [3.0, 3.0, 3.0]\n",
             middle.x - extent,
             middle.y + 4.0 * extent,
             middle.z - extent
@@ -66,7 +66,7 @@ impl Session {
             -size.z
         ));
         line(format_args!(
-            "\n[[virtual]]\nshape = \"box\"\nname = \"box\"\nsize = [{side:.4}, {side:.4}, {side:.4}]\ntranslation = [{:.4}, {:.4}, {:.4}]\nmaterial = {{ base_color = [0.75, 0.20, 0.15], roughness = 0.4 }}\n\n[render]\nrays_per_pixel = 16\n",
+            "\n[[virtual]]\nshape = \"box\"\nname = \"box\"\nsize = [{side:.4}, {side:.4}, {side:.4}]\ntranslation = [{:.4}, {:.4}, {:.4}]\nmaterial = {{ base_color = [0.60, 0.08, 0.05], roughness = 0.4 }}\n\n[render]\nrays_per_pixel = 16\n",
             middle.x,
             middle.y + 0.5 * side + 1e-4,
             middle.z

@@ -68,3 +68,17 @@ fn least(values: &[(f64, f64)]) -> Option<f64> {
     let step = at - before;
     Some(at + 0.5 * step * (left - right) / curvature.max(1e-12))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_of_a_parabola_is_between_its_samples() {
+        let curve = |at: f64| (at, 0.1 + (at - 1.55).powi(2));
+        let found = least(&[1.0, 1.4, 1.8, 2.2].map(curve)).unwrap();
+        assert!((found - 1.55).abs() < 1e-9, "{found}");
+        assert_eq!(least(&[(1.0, 0.1), (1.4, 0.2)]), Some(1.0));
+        assert_eq!(least(&[]), None);
+    }
+}
