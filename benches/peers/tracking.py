@@ -137,7 +137,7 @@ def project(points, rotation, translation, k=K, d=D):
     return cv2.projectPoints(np.asarray(points, float), cv2.Rodrigues(rotation)[0], translation, k, d)[0].reshape(-1, 2)
 
 
-def render(folder, print_board, poses, seed, side=4):
+def render(folder, print_board, poses, seed, side=4, blurs=(0.5, 0.8, 1.2)):
     folder.mkdir()
     random = np.random.default_rng(seed)
     directions = rays(side)
@@ -148,7 +148,7 @@ def render(folder, print_board, poses, seed, side=4):
         light = print_board(eye[0] + reach * ways[..., 0], eye[2] + reach * ways[..., 2])
         light[reach < 0] = 0.1
         light = light.reshape(HEIGHT, side, WIDTH, side).mean((1, 3)) * random.uniform(0.5, 1.0)
-        light = cv2.GaussianBlur(light, (0, 0), random.choice([0.5, 0.8, 1.2]))
+        light = cv2.GaussianBlur(light, (0, 0), random.choice(blurs))
         codes = 255 * np.clip(light, 0, 1) ** (1 / 2.2) + random.normal(0, 2, light.shape)
         cv2.imwrite(str(folder / f"{index:04}.png"), np.clip(np.round(codes), 0, 255).astype(np.uint8))
 
@@ -426,7 +426,7 @@ def measure(mixray, data, folder):
     for distance, expected in [(1.0, 48), (1.4, 47), (1.9, 14)]:
         truth = views(4, 7, lambda _, __: distance)
         name = f"tags{distance}"
-        render(folder / name, lambda x, z: printed(x, z, picture_marker(images)), truth, 8)
+        render(folder / name, lambda x, z: printed(x, z, picture_marker(images)), truth, 8, 4, (0.8,))
         # The lens is given: four views of one distance determine none.
         (folder / "lens.yaml").write_text(f"%YAML:1.0\n---\nimage_width: {WIDTH}\nimage_height: {HEIGHT}\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: {K.ravel().tolist()}\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: {D.tolist()}\n")
         own = mixray.track(folder / name, "--board", folder / "tags.toml", "--intrinsics", folder / "lens.yaml", "--fix-intrinsics", "--gamma", "2.2")
