@@ -20,7 +20,7 @@
 //! A backend knows no file format, and nothing below `cli` prints.
 //!
 //! What is meant for users of the library is named below; the modules are public for the program, the tests and the benchmarks alone,
-//! and may change. Features, all on by default: `cli`, the program; `bench`, its `mixray bench`. Without them the library is lean.
+//! and may change. Features, all on by default: `cli`, the program; `bench`, its `mixray bench`; `track`, its `mixray track`. Without them the library is lean.
 //!
 //! ```no_run
 //! use mixray::{Budget, PngBits, Renderer, RendererOptions, Target, Watcher, load, write_png};
@@ -81,6 +81,9 @@ pub mod sequence;
 pub mod shared;
 #[doc(hidden)]
 pub mod stages;
+#[cfg(feature = "track")]
+#[doc(hidden)]
+pub mod tracking;
 #[doc(hidden)]
 pub mod video;
 #[doc(hidden)]

@@ -19,6 +19,7 @@ mod smooth;
 mod stages;
 mod stress;
 mod support;
+mod tracking;
 mod twins_sampling;
 
 use std::path::{Path, PathBuf};

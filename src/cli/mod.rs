@@ -25,6 +25,8 @@ mod stage_device;
 mod summary;
 mod terminal;
 mod threads;
+#[cfg(feature = "track")]
+mod track;
 mod values;
 
 use std::ffi::OsString;
@@ -49,6 +51,8 @@ struct Arguments {
 enum Command {
     Render(render::Arguments),
     Sequence(sequence::Arguments),
+    #[cfg(feature = "track")]
+    Track(Box<track::Arguments>),
     Merge(merge::Arguments),
     #[cfg(feature = "bench")]
     Bench(Box<bench::Arguments>),
@@ -103,6 +107,8 @@ fn run_command() -> ExitCode {
     let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Sequence(arguments) => sequence::run(&arguments),
+        #[cfg(feature = "track")]
+        Command::Track(arguments) => track::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
         #[cfg(feature = "bench")]
         Command::Bench(arguments) => bench::run(*arguments),

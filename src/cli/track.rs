@@ -1,0 +1,228 @@
+//! `mixray track`: camera poses from the markers or the chessboard in a video.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::progress::Steps;
+use super::terminal::print;
+use super::threads::ThreadsFlag;
+use super::{Failure, Outcome};
+use crate::output::{check_writable, write_text};
+use crate::scene::trajectory::{Focal, read_intrinsics};
+use crate::tracking::{
+    Family, Flatness, Lens, Target, Tone, TrackOptions, family_named, read_board, track,
+};
+
+/// Finds the camera's pose in every frame from markers or a chessboard
+///
+/// Writes a trajectory for `mixray sequence`, and beside it the calibration as OpenCV has it. Frames that show too little have a null pose.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Folder of pictures, .y4m file, file of JPEG pictures one after the other, or - for Y4M on standard input
+    #[arg(required_unless_present = "print_board")]
+    video: Option<PathBuf>,
+    /// What is in the video: TOML ([grid], [[marker]] or [chessboard]), or Kalibr's YAML
+    #[arg(
+        long,
+        value_name = "BOARD.toml",
+        required_unless_present_any = ["marker_size", "print_board"]
+    )]
+    board: Option<PathBuf>,
+    /// Side of the markers' black squares, such as 40mm, where no file says how they lie; they are put together from the frames
+    #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with = "board")]
+    marker_size: Option<f64>,
+    /// Family of the markers: auto, apriltag-36h11, aruco-4x4, square-binary-3x3, ...
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = family)]
+    family: Chosen,
+    /// OpenCV calibration (YAML) to begin with
+    #[arg(long, value_name = "CAL.yaml")]
+    intrinsics: Option<PathBuf>,
+    /// The calibration holds as it is
+    #[arg(long, requires = "intrinsics")]
+    fix_intrinsics: bool,
+    /// How codes become light: auto, srgb, or light is the code to this power
+    #[arg(long, value_name = "GAMMA", default_value = "auto", value_parser = gamma)]
+    gamma: Gamma,
+    /// How far the board's surface may bend out of its plane, or "rigid"
+    #[arg(long, value_name = "LENGTH", default_value = "2mm", value_parser = flatness)]
+    board_flatness: Flatness,
+    /// Poses for `mixray sequence` (.json); the calibration goes to the same name with .yaml
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Everything that was found: corners, residuals, covariances, the board as it is
+    #[arg(long, value_name = "track.json")]
+    report: Option<PathBuf>,
+    /// The frames with what was found drawn on them
+    #[arg(long, value_name = "check.y4m")]
+    overlay: Option<PathBuf>,
+    /// Twelve of them in one picture
+    #[arg(long, value_name = "check.png")]
+    sheet: Option<PathBuf>,
+    /// A scene to begin with: the board's plane, and a box on it
+    #[arg(long, value_name = "OUT.toml")]
+    scene: Option<PathBuf>,
+    /// Tracks nothing, and writes this board to --output as an SVG to print
+    #[arg(long, value_name = "BOARD.toml", conflicts_with_all = ["video", "board", "marker_size"])]
+    print_board: Option<PathBuf>,
+    #[command(flatten)]
+    threads: ThreadsFlag,
+}
+
+/// `None`: whichever is found.
+#[derive(Clone, Copy, Debug)]
+struct Chosen(Option<&'static Family>);
+
+/// `None`: estimated.
+#[derive(Clone, Copy, Debug)]
+struct Gamma(Option<Tone>);
+
+pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    arguments.threads.start()?;
+    match (&arguments.print_board, &arguments.video) {
+        (Some(board), _) => {
+            let svg = read_board(board)?.svg()?;
+            write_text(&arguments.output, &svg)?;
+        }
+        (None, Some(video)) => run_on(video, arguments)?,
+        (None, None) => unreachable!("clap asks for one of them"),
+    }
+    Ok(Outcome::Done)
+}
+
+fn run_on(video: &Path, arguments: &Arguments) -> Result<(), Failure> {
+    let options = arguments.options()?;
+    let calibration = arguments.output.with_extension("yaml");
+    let (report, scene) = (arguments.report.as_ref(), arguments.scene.as_ref());
+    let (overlay, sheet) = (arguments.overlay.as_ref(), arguments.sheet.as_ref());
+    let outputs = [
+        Some(&arguments.output),
+        Some(&calibration),
+        report,
+        scene,
+        overlay,
+        sheet,
+    ];
+    for path in outputs.into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let steps = Steps::new(0);
+    let tracked = track(video, &options, &|frames| {
+        steps.say(&format!("{frames} frames looked at"));
+    });
+    steps.clear();
+    let session = tracked?;
+    write_text(
+        &arguments.output,
+        &serde_json::to_string(&session.trajectory())?,
+    )?;
+    write_text(&calibration, &session.calibration())?;
+    if let Some(path) = report {
+        write_text(path, &serde_json::to_string(&session.report())?)?;
+    }
+    if let Some(path) = scene {
+        write_text(path, &session.starter_scene())?;
+    }
+    if let Some(path) = overlay {
+        session.write_overlay(video, path)?;
+    }
+    if let Some(path) = sheet {
+        session.write_sheet(video, path)?;
+    }
+    print(&session.summary())
+}
+
+impl Arguments {
+    fn options(&self) -> Result<TrackOptions, Failure> {
+        let target = match (&self.board, self.marker_size) {
+            (Some(path), _) => Target::Board(read_board(path)?),
+            (None, Some(side_m)) => Target::Markers { side_m },
+            (None, None) => unreachable!("clap asks for one of them"),
+        };
+        Ok(TrackOptions {
+            target,
+            family: self.family.0,
+            lens: self.lens()?,
+            fix_lens: self.fix_intrinsics,
+            tone: self.gamma.0,
+            flatness: self.board_flatness,
+        })
+    }
+
+    fn lens(&self) -> Result<Option<Lens>, Failure> {
+        let Some(path) = &self.intrinsics else {
+            return Ok(None);
+        };
+        let intrinsics = read_intrinsics(path)?;
+        let (Focal::Pixels([fx, fy]), Some([cx, cy])) = (intrinsics.focal, intrinsics.centre)
+        else {
+            return Err(Failure(format!(
+                "{}: it has a field of view only; expected focal length and centre in pixels; export it again",
+                path.display()
+            )));
+        };
+        if !self.fix_intrinsics && intrinsics.distortion.model != crate::distortion::LENS_RADIAL {
+            return Err(Failure(format!(
+                "{}: its lens has more than k1 k2 p1 p2 k3, which are all that can be solved for; expected it fixed; give --fix-intrinsics",
+                path.display()
+            )));
+        }
+        Ok(Some(Lens {
+            focal: [fx, fy].into(),
+            centre: [cx, cy].into(),
+            distortion: intrinsics.distortion,
+        }))
+    }
+}
+
+fn family(name: &str) -> Result<Chosen, String> {
+    match name {
+        "auto" => Ok(Chosen(None)),
+        _ => family_named(name).map(|family| Chosen(Some(family))),
+    }
+}
+
+fn gamma(text: &str) -> Result<Gamma, &'static str> {
+    match (text, text.parse::<f64>()) {
+        ("auto", _) => Ok(Gamma(None)),
+        ("srgb", _) => Ok(Gamma(Some(Tone::Srgb))),
+        (_, Ok(power)) if (0.5..=4.0).contains(&power) => Ok(Gamma(Some(Tone::Power(power)))),
+        _ => Err("expected auto, srgb, or a power from 0.5 to 4"),
+    }
+}
+
+fn flatness(text: &str) -> Result<Flatness, &'static str> {
+    match text {
+        "rigid" => Ok(Flatness::RIGID),
+        _ => length(text)
+            .map(Flatness::of_paper)
+            .map_err(|_| "expected a length such as 2mm, or rigid"),
+    }
+}
+
+/// Metres of "40mm", "4cm", "0.04m" or "1.5in".
+fn length(text: &str) -> Result<f64, &'static str> {
+    let units = [("mm", 1e-3), ("cm", 1e-2), ("in", 0.0254), ("m", 1.0)];
+    let parsed = units.into_iter().find_map(|(unit, metres)| {
+        let number = text.strip_suffix(unit)?.trim().parse::<f64>().ok()?;
+        (number > 0.0 && number < 1e6).then_some(number * metres)
+    });
+    parsed.ok_or("expected a length with its unit, such as 40mm, 4cm, 0.04m or 1.5in")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_need_their_unit() {
+        assert!((length("40mm").unwrap() - 0.04).abs() < 1e-12);
+        assert!((length("1.5in").unwrap() - 0.0381).abs() < 1e-12);
+        assert!((length("0.2m").unwrap() - 0.2).abs() < 1e-12);
+        for wrong in ["40", "mm", "-4mm", "4 feet", "nanm"] {
+            assert!(length(wrong).is_err(), "{wrong}");
+        }
+        assert!(flatness("rigid").unwrap().is_rigid() && !flatness("2mm").unwrap().is_rigid());
+        assert!(gamma("9").is_err() && gamma("1.4").is_ok() && family("hiro").is_err());
+    }
+}

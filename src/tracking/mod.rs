@@ -1,0 +1,70 @@
+//! Camera poses from markers and chessboards in a video.
+//!
+//! Frames in linear light -> dark quadrilaterals -> sides as sub-pixel edge points -> codes -> lens and board by bundle adjustment over some frames ->
+//! lines fitted where sides are straight, in undistorted space -> every frame's pose from all that it shows, with its covariance.
+//!
+//! Inside, pixels have the corner origin, cameras OpenCV's axes.
+
+mod board;
+mod board_file;
+mod bundle;
+mod calibrate;
+mod canvas;
+mod chessboard;
+mod choice;
+mod detector;
+mod edge;
+mod family;
+mod frame_pose;
+mod half_turn;
+mod homography;
+mod lattice;
+mod layout;
+mod learning;
+mod lens;
+mod light;
+mod line;
+mod marker;
+mod options;
+mod outline;
+mod overlay;
+mod pose;
+mod prepare;
+mod print;
+mod quad;
+mod report;
+mod saddle;
+mod session;
+mod settle;
+mod starter;
+mod tone;
+mod tracker;
+
+pub use board::{Board, BoardKind, Flatness};
+pub use board_file::{family_named, read_board};
+pub use choice::Choice;
+pub use detector::{Detector, FrameSeen};
+pub use family::{FAMILIES, Family};
+pub use learning::learn_from;
+pub use lens::Lens;
+pub use light::{Luma, Tone};
+pub use marker::{Marker, Seen, find_markers};
+pub use options::{Target, TrackOptions};
+pub use prepare::prepare;
+pub use session::{Session, track};
+pub use tracker::{Tracked, TrackedFrame, pose_all};
+
+/// Why no poses are found. Displays as one line: "problem; expected ...; how to mend".
+#[derive(Debug, thiserror::Error)]
+pub enum TrackError {
+    #[error(transparent)]
+    Video(#[from] crate::video::VideoError),
+    #[error("{0}")]
+    Input(String),
+}
+
+impl TrackError {
+    fn input(message: impl Into<String>) -> Self {
+        Self::Input(message.into())
+    }
+}

@@ -1,0 +1,43 @@
+//! What is asked of a run.
+
+use super::board::{Board, BoardKind, Flatness};
+use super::family::Family;
+use super::lens::Lens;
+use super::light::Tone;
+
+/// What is asked of a run.
+#[derive(Clone, Debug)]
+pub struct TrackOptions {
+    pub target: Target,
+    /// `None`: whichever is found.
+    pub family: Option<&'static Family>,
+    pub lens: Option<Lens>,
+    /// The lens given holds as it is.
+    pub fix_lens: bool,
+    /// `None`: estimated.
+    pub tone: Option<Tone>,
+    pub flatness: Flatness,
+}
+
+/// What the camera's poses refer to.
+#[derive(Clone, Debug)]
+pub enum Target {
+    Board(Board),
+    /// Markers of this side in metres, wherever they are.
+    Markers {
+        side_m: f64,
+    },
+}
+
+impl Target {
+    /// Columns and rows of inner corners, if it is one.
+    pub fn chessboard(&self) -> Option<(usize, usize)> {
+        match self {
+            Self::Board(board) => match board.kind {
+                BoardKind::Chessboard { columns, rows, .. } => Some((columns, rows)),
+                _ => None,
+            },
+            Self::Markers { .. } => None,
+        }
+    }
+}
