@@ -17,6 +17,7 @@ mod motion_blur;
 mod noise;
 mod picture_flags;
 mod pool;
+mod preview;
 mod progress;
 mod render;
 mod scene_flags;
@@ -48,6 +49,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(render::Arguments),
+    Preview(preview::Arguments),
     Sequence(sequence::Arguments),
     Merge(merge::Arguments),
     #[cfg(feature = "bench")]
@@ -99,9 +101,13 @@ fn run_command() -> ExitCode {
     interrupt::survive_file_limits();
     let arguments = Arguments::try_parse_from(words(std::env::args_os()))
         .unwrap_or_else(|error| end_with_usage(error));
-    files::guard_run();
+    // The window writes the scene that it reads.
+    if !matches!(arguments.command, Command::Preview(_)) {
+        files::guard_run();
+    }
     let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
+        Command::Preview(arguments) => preview::run(&arguments),
         Command::Sequence(arguments) => sequence::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
         #[cfg(feature = "bench")]
