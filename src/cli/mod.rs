@@ -83,7 +83,11 @@ impl<E: std::error::Error> From<E> for Failure {
 /// Parses the process's arguments and runs the command.
 pub fn run() -> ExitCode {
     quiet_device_selection();
-    pool::on_large_stack(run_command)
+    // Windows are opened by the main thread alone.
+    match std::env::args_os().nth(1) {
+        Some(command) if command == "preview" => run_command(),
+        _ => pool::on_large_stack(run_command),
+    }
 }
 
 /// Mesa's layer that orders devices asks the desktop, and complains on the terminal where there is none.

@@ -109,7 +109,11 @@ impl Window {
     pub fn wait_for_scene(&mut self) -> Result<(), String> {
         self.wait_until("reading the scene", |session| {
             !session.is_reading() && session.loaded().is_some()
-        })
+        })?;
+        // Panels have their sizes once they were drawn, and the picture has its own from the frame after.
+        self.frame();
+        self.frame();
+        Ok(())
     }
 
     /// Until the present state is shown; with `rays`, at full size with so many.

@@ -11,18 +11,22 @@ use crate::stages::finish;
 /// Enlarged over the whole photograph.
 pub(super) fn coarse_picture(renderer: &Renderer, wanted: &Wanted) -> Shown {
     let small = renderer.picture();
-    let planes = renderer.planes();
+    // Planes would be filtered once more, which takes as long as the rays.
+    let pixels = renderer.film().pixels.iter();
+    let mask: Vec<f32> = pixels
+        .map(|sums| sums.m as f32 / sums.n.max(1) as f32)
+        .collect();
     let camera = &wanted.scene.camera;
     let size = [camera.width, camera.height];
     let photo = wanted.scene.photo.as_ref();
     let small_photo = renderer.scene().photo.as_ref();
-    let picture = over_photo(&small, &planes.mask, small_photo, photo, size);
+    let picture = over_photo(&small, &mask, small_photo, photo, size);
     let (codes, [width, height]) = match wanted.view {
         View::Picture => (picture_codes8(&picture, photo), size),
         View::Photograph => (photo_codes(photo, size), size),
         view => {
             let scene = renderer.scene();
-            let codes = false_colours(view, &small, &planes, &scene.lens, &scene.camera);
+            let codes = false_colours(view, &small, &renderer.planes(), &scene.lens, &scene.camera);
             (codes, [small.width, small.height])
         }
     };
