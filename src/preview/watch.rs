@@ -125,10 +125,6 @@ mod tests {
         std::fs::write(&watched, "longer still").unwrap();
         assert_eq!(wait(&mut watch), [watched]);
         std::fs::write(other, "b").unwrap();
-        assert_eq!(
-            wait(&mut watch),
-            [PathBuf::new(); 0],
-            "control: another file"
-        );
+        assert!(wait(&mut watch).is_empty(), "control: another file");
     }
 }
