@@ -289,7 +289,7 @@ fn room_agrees_with_mitsuba() {
 /// Mirror, glass and rough metal under a sunny sky. Changed: the glass has the index 1.45 instead of 1.5.
 #[test]
 fn sunny_agrees_with_mitsuba() {
-    check("sunny", BackendChoice::Cpu, 24, |scene| {
+    check("sunny", BackendChoice::Cpu, 64, |scene| {
         change_material(scene, "glass", |m| m.ior = 1.45);
     });
 }

@@ -120,8 +120,11 @@ pub fn render_all(
 }
 
 pub fn empty_film(renderer: &Renderer, first: u32, all_planes: bool) -> Film {
-    let frame = &renderer.packed().frame;
-    Film::new(frame.width, frame.height, first, all_planes)
+    let scene = renderer.packed();
+    let frame = &scene.frame;
+    let mut film = Film::new(frame.width, frame.height, first, all_planes);
+    film.set_sample_factors(scene.pixels.iter().map(|pixel| pixel.sample_factor));
+    film
 }
 
 /// The film of the CPU, and its rays.

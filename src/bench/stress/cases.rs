@@ -176,9 +176,9 @@ pub fn cases() -> Vec<Case> {
         },
         Case {
             unit: "photons",
-            settings: &[1.0, 10.0],
-            quick_settings: &[1.0],
-            control_at: 10.0,
+            settings: &[10.0, 30.0],
+            quick_settings: &[10.0],
+            control_at: 30.0,
             bound: 0.5,
             run: shortcuts::few_pilot_photons,
             ..photons(
