@@ -20,7 +20,8 @@
 //! A backend knows no file format, and nothing below `cli` prints.
 //!
 //! What is meant for users of the library is named below; the modules are public for the program, the tests and the benchmarks alone,
-//! and may change. Features, all on by default: `cli`, the program; `bench`, its `mixray bench`; `track`, its `mixray track`. Without them the library is lean.
+//! and may change. Features, on by default: `cli`, the program; `bench`, its `mixray bench`; `track`, its `mixray track`. Without them the library is
+//! lean. Off by default: `preview`, the window of `mixray preview`.
 //!
 //! ```no_run
 //! use mixray::{Budget, PngBits, Renderer, RendererOptions, Target, Watcher, load, write_png};
@@ -70,6 +71,9 @@ pub mod output;
 pub mod pack;
 #[doc(hidden)]
 pub mod packed;
+#[cfg(feature = "preview")]
+#[doc(hidden)]
+pub mod preview;
 mod refusal;
 #[doc(hidden)]
 pub mod renderer;

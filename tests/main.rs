@@ -11,6 +11,8 @@ mod gltf_pictures;
 mod interrupted;
 mod invariants;
 mod overwriting;
+#[cfg(feature = "preview")]
+mod preview;
 mod references;
 mod sandbox;
 mod scenes;

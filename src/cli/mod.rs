@@ -17,6 +17,7 @@ mod motion_blur;
 mod noise;
 mod picture_flags;
 mod pool;
+mod preview;
 mod progress;
 mod render;
 mod scene_flags;
@@ -50,6 +51,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(render::Arguments),
+    Preview(preview::Arguments),
     Sequence(sequence::Arguments),
     #[cfg(feature = "track")]
     Track(Box<track::Arguments>),
@@ -85,7 +87,11 @@ impl<E: std::error::Error> From<E> for Failure {
 /// Parses the process's arguments and runs the command.
 pub fn run() -> ExitCode {
     quiet_device_selection();
-    pool::on_large_stack(run_command)
+    // Windows are opened by the main thread alone.
+    match std::env::args_os().nth(1) {
+        Some(command) if command == "preview" => run_command(),
+        _ => pool::on_large_stack(run_command),
+    }
 }
 
 /// Mesa's layer that orders devices asks the desktop, and complains on the terminal where there is none.
@@ -103,9 +109,13 @@ fn run_command() -> ExitCode {
     interrupt::survive_file_limits();
     let arguments = Arguments::try_parse_from(words(std::env::args_os()))
         .unwrap_or_else(|error| end_with_usage(error));
-    files::guard_run();
+    // The window writes the scene that it reads.
+    if !matches!(arguments.command, Command::Preview(_)) {
+        files::guard_run();
+    }
     let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
+        Command::Preview(arguments) => preview::run(&arguments),
         Command::Sequence(arguments) => sequence::run(&arguments),
         #[cfg(feature = "track")]
         Command::Track(arguments) => track::run(&arguments),

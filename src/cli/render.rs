@@ -138,6 +138,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         sample_range: job.range,
         without: job.flags.without(),
         filter: job.flags.goal.filter,
+        draft: false,
     };
     let hear = |progress: &Progress| bar.hear(progress);
     let watcher = Watcher::none().heard_by(&hear);

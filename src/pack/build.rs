@@ -188,7 +188,8 @@ impl PackedScene {
         }
     }
 
-    fn set_environment(&mut self, scene: &Scene) {
+    /// The environment's radiance, rotation and tables; lights are packed after it.
+    pub fn set_environment(&mut self, scene: &Scene) {
         let Some(environment) = &scene.environment else {
             set_rotation(&mut self.frame, 0.0);
             return;

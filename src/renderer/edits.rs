@@ -4,7 +4,7 @@ use glam::DMat4;
 
 use super::{RenderError, Renderer};
 use crate::gpu::Changed;
-use crate::scene::{Lens, Light, LightKind, Settings, Side};
+use crate::scene::{Exposure, Lens, Light, LightKind, Settings, Side};
 use crate::work::Watcher;
 
 impl Renderer {
@@ -88,6 +88,42 @@ impl Renderer {
                 self.restart(true, Changed::All, watcher)
             }
         }
+    }
+
+    /// Another rotation and scale of the environment; nothing changes without one. No tree is built.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn set_environment(
+        &mut self,
+        rotation_deg: f64,
+        scale: f64,
+        watcher: &Watcher<'_>,
+    ) -> Result<(), RenderError> {
+        let Some(environment) = &mut self.core.scene.environment else {
+            return Ok(());
+        };
+        (environment.rotation_deg, environment.scale) = (rotation_deg, scale);
+        self.core.packed.set_environment(&self.core.scene);
+        self.core.pack_moving(watcher)?;
+        self.restart(true, Changed::All, watcher)
+    }
+
+    /// Another exposure and depth of paths. No tree is built.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn set_transport(
+        &mut self,
+        exposure: Exposure,
+        max_bounces: u32,
+        watcher: &Watcher<'_>,
+    ) -> Result<(), RenderError> {
+        self.core.scene.settings.exposure = exposure;
+        self.core.scene.settings.max_bounces = max_bounces;
+        self.core.packed.set_settings(&self.core.scene);
+        self.core.pack_moving(watcher)?;
+        self.restart(true, Changed::All, watcher)
     }
 
     /// Other lights. Real quads are part of the real world, so where they change it is built anew.

@@ -120,7 +120,10 @@ impl Renderer {
         let note = core.packed.black_shadows(photons);
         core.notes
             .extend(note.filter(|note| !core.notes.contains(note)));
-        core.backdrop_share = cpu::backdrop_share(&mut core.packed);
+        core.backdrop_share = match core.options.draft {
+            true => None,
+            false => cpu::backdrop_share(&mut core.packed),
+        };
         core.film = Film::new(
             core.film.width,
             core.film.height,

@@ -69,6 +69,15 @@ pub fn load_with(path: &Path, given: Given) -> std::result::Result<Scene, SceneE
     read_scene(&source, given)
 }
 
+/// [`load`] of a scene file whose text is not that on the disk: what it names is read from its folder.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_text(path: &Path, text: &str) -> std::result::Result<Scene, SceneError> {
+    let source = Source::new(path, text.as_bytes().to_vec())?;
+    read_scene(&source, Given::default())
+}
+
 pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
     let document = DeTable::parse(&source.text).map_err(|error| {
         let offset = error.span().map_or(0, |span| span.start);

@@ -1,0 +1,484 @@
+//! The scene file's text, edited in place: comments, order and everything that was not changed stay as they are.
+
+use std::path::Path;
+
+use glam::{DQuat, DVec3};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, Value};
+
+use super::composition::{
+    CameraPose, Composition, EnvironmentForm, LensForm, Opening, Placement, Rotation,
+};
+use crate::scene::{Aperture, Exposure, Scene, Side};
+
+/// A scene file's text that is valid TOML.
+#[derive(Clone, Debug)]
+pub struct Document(DocumentMut);
+
+impl Document {
+    /// # Errors
+    /// It is no TOML; [`crate::scene::load_text`] says where.
+    pub fn parse(text: &str) -> Result<Self, toml_edit::TomlError> {
+        Ok(Self(text.parse()?))
+    }
+
+    pub fn text(&self) -> String {
+        self.0.to_string()
+    }
+
+    /// What the text says, of a scene that was read from it.
+    pub fn composition(&self, scene: &Scene) -> Composition {
+        let (mut real, mut added) = (0, 0);
+        let objects = scene.objects.iter().map(|object| {
+            let (key, index) = match object.side {
+                Side::Real => ("real", &mut real),
+                Side::Virtual => ("virtual", &mut added),
+            };
+            let table = self.entry(key, *index);
+            *index += 1;
+            table.map_or(Placement::IDENTITY, read_placement)
+        });
+        let objects = objects.collect();
+        Composition {
+            camera: self.camera(scene),
+            lens: self.lens(scene),
+            environment: (scene.environment.as_ref()).map(|environment| EnvironmentForm {
+                rotation_deg: environment.rotation_deg,
+                scale: environment.scale,
+            }),
+            exposure: scene.settings.exposure,
+            rays_per_pixel: scene.settings.rays_per_pixel,
+            max_bounces: scene.settings.max_bounces,
+            seed: scene.settings.seed,
+            objects,
+        }
+    }
+
+    fn table(&self, key: &str) -> Option<&dyn TableLike> {
+        self.0.get(key)?.as_table_like()
+    }
+
+    /// An element of a list of tables, however it is written.
+    fn entry(&self, key: &str, index: usize) -> Option<&dyn TableLike> {
+        match self.0.get(key)? {
+            Item::ArrayOfTables(tables) => tables.get(index).map(|table| table as &dyn TableLike),
+            Item::Value(Value::Array(array)) => array
+                .get(index)?
+                .as_inline_table()
+                .map(|table| table as &dyn TableLike),
+            _ => None,
+        }
+    }
+
+    fn entry_mut(&mut self, key: &str, index: usize) -> Option<&mut dyn TableLike> {
+        match self.0.get_mut(key)? {
+            Item::ArrayOfTables(tables) => {
+                (tables.get_mut(index)).map(|table| table as &mut dyn TableLike)
+            }
+            Item::Value(Value::Array(array)) => array
+                .get_mut(index)?
+                .as_inline_table_mut()
+                .map(|table| table as &mut dyn TableLike),
+            _ => None,
+        }
+    }
+
+    fn table_mut(&mut self, key: &str) -> &mut dyn TableLike {
+        let item = self.0.entry(key).or_insert(Item::Table(Table::new()));
+        if !item.is_table_like() {
+            *item = Item::Table(Table::new());
+        }
+        item.as_table_like_mut()
+            .expect("a table has just been put there")
+    }
+
+    fn camera(&self, scene: &Scene) -> CameraPose {
+        let matrix = CameraPose::Matrix(scene.camera.world_from_camera);
+        let Some(table) = self.table("camera") else {
+            return matrix;
+        };
+        match (vector(table, "position"), vector(table, "look_at")) {
+            (Some(position), Some(look_at)) => CameraPose::LookAt {
+                position,
+                look_at,
+                up: vector(table, "up").unwrap_or(DVec3::Y),
+            },
+            _ => matrix,
+        }
+    }
+
+    fn lens(&self, scene: &Scene) -> LensForm {
+        let lens = scene.lens;
+        let table = self.table("lens");
+        let number = |key| number(table?.get(key)?);
+        let opening = match (number("f_number"), number("focal_length_mm")) {
+            (Some(f_number), Some(focal_length_mm)) => Opening::FNumber {
+                f_number,
+                focal_length_mm,
+            },
+            _ => Opening::RadiusM(lens.aperture_radius_m),
+        };
+        LensForm {
+            opening,
+            focus_distance_m: lens.focus_distance_m,
+            aperture: lens.aperture,
+            blade_rotation_deg: lens.blade_rotation_deg,
+        }
+    }
+
+    /// Writes what differs; `was` is what the text says. Both are of this scene.
+    pub fn write(&mut self, was: &Composition, is: &Composition, scene: &Scene) {
+        if was.camera != is.camera {
+            self.write_camera(&is.camera);
+        }
+        if was.lens != is.lens {
+            self.write_lens(&was.lens, &is.lens);
+        }
+        if let Some(form) = is.environment.filter(|_| was.environment != is.environment) {
+            let table = self.table_mut("environment");
+            set(table, "rotation_deg", form.rotation_deg);
+            set(table, "scale", form.scale);
+        }
+        if was.exposure != is.exposure {
+            let table = self.table_mut("photo");
+            match is.exposure {
+                Exposure::Ev(ev) => set(table, "exposure_ev", ev),
+                Exposure::Auto => set(table, "exposure_ev", "auto"),
+            }
+        }
+        for (key, was, is) in [
+            ("rays_per_pixel", was.rays_per_pixel, is.rays_per_pixel),
+            ("max_bounces", was.max_bounces, is.max_bounces),
+            ("seed", was.seed, is.seed),
+        ] {
+            if was != is {
+                set(self.table_mut("render"), key, i64::from(is));
+            }
+        }
+        let (mut real, mut added) = (0, 0);
+        for (index, object) in scene.objects.iter().enumerate() {
+            let (key, place) = match object.side {
+                Side::Real => ("real", &mut real),
+                Side::Virtual => ("virtual", &mut added),
+            };
+            let (was, is) = (was.objects[index], is.objects[index]);
+            if was != is
+                && let Some(table) = self.entry_mut(key, *place)
+            {
+                write_placement(table, &was, &is);
+            }
+            *place += 1;
+        }
+    }
+
+    fn write_camera(&mut self, pose: &CameraPose) {
+        let table = self.table_mut("camera");
+        match *pose {
+            CameraPose::LookAt {
+                position,
+                look_at,
+                up,
+            } => {
+                table.remove("world_from_camera");
+                set_vector(table, "position", position);
+                set_vector(table, "look_at", look_at);
+                if up != DVec3::Y || table.contains_key("up") {
+                    set_vector(table, "up", up);
+                }
+            }
+            CameraPose::Matrix(matrix) => {
+                for key in ["position", "look_at", "up"] {
+                    table.remove(key);
+                }
+                let rows = matrix.transpose().to_cols_array_2d();
+                let rows: Array = rows
+                    .iter()
+                    .map(|row| Value::Array(Array::from_iter(*row)))
+                    .collect();
+                set(table, "world_from_camera", rows);
+            }
+        }
+    }
+
+    fn write_lens(&mut self, was: &LensForm, is: &LensForm) {
+        let table = self.table_mut("lens");
+        if was.opening != is.opening {
+            match is.opening {
+                Opening::FNumber {
+                    f_number,
+                    focal_length_mm,
+                } => {
+                    table.remove("aperture_radius_m");
+                    for (key, value) in
+                        [("f_number", f_number), ("focal_length_mm", focal_length_mm)]
+                    {
+                        if table.get(key).and_then(number) != Some(value) {
+                            set(table, key, value);
+                        }
+                    }
+                }
+                Opening::RadiusM(radius) => {
+                    table.remove("f_number");
+                    table.remove("focal_length_mm");
+                    set(table, "aperture_radius_m", radius);
+                }
+            }
+        }
+        if was.focus_distance_m != is.focus_distance_m || !table.contains_key("focus_distance_m") {
+            set(table, "focus_distance_m", is.focus_distance_m);
+        }
+        if was.aperture != is.aperture {
+            match is.aperture {
+                Aperture::Disc => set(table, "aperture", "disc"),
+                Aperture::Square => set(table, "aperture", "square"),
+                Aperture::Blades(blades) => set(table, "aperture", i64::from(blades)),
+            }
+        }
+        if was.blade_rotation_deg != is.blade_rotation_deg {
+            set(table, "blade_rotation_deg", is.blade_rotation_deg);
+        }
+    }
+
+    /// Appends a virtual object.
+    pub fn add_mesh(&mut self, mesh: &str, placement: &Placement) {
+        let mut table = Table::new();
+        table["mesh"] = toml_edit::value(mesh);
+        write_placement(&mut table, &Placement::IDENTITY, placement);
+        match self
+            .0
+            .entry("virtual")
+            .or_insert(Item::ArrayOfTables(ArrayOfTables::new()))
+        {
+            Item::ArrayOfTables(tables) => {
+                table.decor_mut().set_prefix("\n");
+                tables.push(table);
+            }
+            Item::Value(Value::Array(array)) => array.push(InlineTable::from_iter(
+                table
+                    .into_iter()
+                    .filter_map(|(key, item)| Some((key, item.into_value().ok()?))),
+            )),
+            _ => {}
+        }
+    }
+
+    /// Takes a virtual object out, by its number among them.
+    pub fn remove_virtual(&mut self, index: usize) {
+        match self.0.get_mut("virtual") {
+            Some(Item::ArrayOfTables(tables)) if index < tables.len() => {
+                tables.remove(index);
+            }
+            Some(Item::Value(Value::Array(array))) if index < array.len() => {
+                array.remove(index);
+            }
+            _ => {}
+        }
+    }
+
+    /// Names another image, `[photo]` or `[environment]`.
+    pub fn set_image(&mut self, table: &str, image: &str) {
+        let table = self.table_mut(table);
+        table.remove("radiance");
+        set(table, "image", image);
+    }
+}
+
+/// A file as a scene file names it: relative to the scene's folder where it lies within.
+pub fn name_of(file: &Path, scene: &Path) -> String {
+    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let (file, scene) = (absolute(file), absolute(scene));
+    let folder = scene.parent().unwrap_or(Path::new("")).to_path_buf();
+    let name = file.strip_prefix(&folder).unwrap_or(&file);
+    // Slashes are read on every system.
+    name.to_string_lossy().replace('\\', "/")
+}
+
+impl Placement {
+    pub const IDENTITY: Self = Self {
+        translation: DVec3::ZERO,
+        rotation: Rotation::EulerDeg(DVec3::ZERO),
+        scale: DVec3::ONE,
+    };
+}
+
+fn read_placement(table: &dyn TableLike) -> Placement {
+    let quaternion = table.get("rotation").and_then(numbers::<4>);
+    let euler = vector(table, "rotation_deg").unwrap_or(DVec3::ZERO);
+    let scale = table.get("scale").and_then(|item| match number(item) {
+        Some(factor) => Some(DVec3::splat(factor)),
+        None => numbers::<3>(item).map(DVec3::from),
+    });
+    Placement {
+        translation: vector(table, "translation").unwrap_or(DVec3::ZERO),
+        rotation: match quaternion {
+            Some(q) => Rotation::Quaternion(DQuat::from_array(q).normalize()),
+            None => Rotation::EulerDeg(euler),
+        },
+        scale: scale.unwrap_or(DVec3::ONE),
+    }
+}
+
+fn write_placement(table: &mut dyn TableLike, was: &Placement, is: &Placement) {
+    if was.translation != is.translation {
+        set_vector(table, "translation", is.translation);
+    }
+    if was.rotation != is.rotation {
+        match is.rotation {
+            Rotation::EulerDeg(deg) => {
+                table.remove("rotation");
+                set_vector(table, "rotation_deg", deg);
+            }
+            Rotation::Quaternion(q) => {
+                table.remove("rotation_deg");
+                set(table, "rotation", Array::from_iter(q.to_array()));
+            }
+        }
+    }
+    if was.scale != is.scale {
+        match is.scale == DVec3::splat(is.scale.x) {
+            true => set(table, "scale", is.scale.x),
+            false => set_vector(table, "scale", is.scale),
+        }
+    }
+}
+
+fn number(item: &Item) -> Option<f64> {
+    item.as_float()
+        .or_else(|| item.as_integer().map(|n| n as f64))
+}
+
+fn numbers<const N: usize>(item: &Item) -> Option<[f64; N]> {
+    let array = item.as_array()?;
+    let all: Option<Vec<f64>> = array
+        .iter()
+        .map(|value| {
+            value
+                .as_float()
+                .or_else(|| value.as_integer().map(|n| n as f64))
+        })
+        .collect();
+    all?.try_into().ok()
+}
+
+fn vector(table: &dyn TableLike, key: &str) -> Option<DVec3> {
+    table.get(key).and_then(numbers::<3>).map(DVec3::from)
+}
+
+fn set_vector(table: &mut dyn TableLike, key: &str, vector: DVec3) {
+    set(table, key, Array::from_iter(vector.to_array()));
+}
+
+/// The comment behind the value stays.
+fn set(table: &mut dyn TableLike, key: &str, value: impl Into<Value>) {
+    let mut value = value.into();
+    if let Some(old) = table.get(key).and_then(Item::as_value) {
+        *value.decor_mut() = old.decor().clone();
+    }
+    table.insert(key, Item::Value(value));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load_text;
+
+    const TEXT: &str = "\
+# my desk
+[camera] # from the calibration
+width = 32
+height = 24
+vertical_fov_deg = 40
+position = [0, 1, 3] # metres
+look_at = [0, 0, 0]
+
+[lens]
+f_number = 1.8 # wide open
+focal_length_mm = 50
+focus_distance_m = 3
+
+[environment]
+radiance = [1, 1, 1]
+
+[[virtual]]   # the ball
+shape = \"sphere\"
+translation = [0.1, 0.05, -0.2] # where it lies
+rotation_deg = [0, 30, 0]
+
+[render] # fast
+rays_per_pixel = 4
+";
+
+    #[test]
+    fn edits_keep_comments_and_read_back_as_the_same_scene() {
+        let path = Path::new("scene.toml");
+        let scene = load_text(path, TEXT).unwrap();
+        let mut document = Document::parse(TEXT).unwrap();
+        let was = document.composition(&scene);
+        let mut same = document.clone();
+        same.write(&was, &was, &scene);
+        assert_eq!(same.text(), TEXT, "nothing changed");
+
+        let mut is = was.clone();
+        is.lens.opening = Opening::FNumber {
+            f_number: 5.6,
+            focal_length_mm: 50.0,
+        };
+        is.lens.focus_distance_m = 2.345;
+        is.objects[0].translation.x = 0.123_45;
+        is.objects[0].rotation = Rotation::EulerDeg(DVec3::new(0.1, 31.7, 0.0));
+        is.camera = CameraPose::LookAt {
+            position: DVec3::new(0.3, 1.1, 3.0),
+            look_at: DVec3::ZERO,
+            up: DVec3::Y,
+        };
+        is.environment = Some(EnvironmentForm {
+            rotation_deg: 12.5,
+            scale: 1.7,
+        });
+        is.rays_per_pixel = 9;
+        document.write(&was, &is, &scene);
+        let text = document.text();
+        for kept in [
+            "# my desk",
+            "[camera] # from the calibration",
+            "position = [0.3, 1.1, 3.0] # metres",
+            "f_number = 5.6 # wide open",
+            "[[virtual]]   # the ball",
+            "translation = [0.12345, 0.05, -0.2] # where it lies",
+            "[render] # fast",
+        ] {
+            assert!(text.contains(kept), "{kept}:\n{text}");
+        }
+        let read = load_text(path, &text).unwrap();
+        let mut applied = scene.clone();
+        is.apply(&mut applied);
+        let facts = |scene: &Scene| {
+            format!(
+                "{:?} {:?} {:?} {:?}",
+                scene.camera, scene.lens, scene.objects[0].world_from_object, scene.settings
+            )
+        };
+        assert_eq!(facts(&read), facts(&applied));
+        assert_ne!(facts(&read), facts(&scene), "control");
+        assert_eq!(document.composition(&read), is);
+    }
+
+    #[test]
+    fn objects_come_and_go() {
+        let mut document = Document::parse(TEXT).unwrap();
+        document.add_mesh("knot.glb", &Placement::IDENTITY);
+        assert!(
+            document.text().contains("[[virtual]]\nmesh = \"knot.glb\""),
+            "{}",
+            document.text()
+        );
+        document.remove_virtual(1);
+        assert_eq!(document.text(), TEXT);
+    }
+
+    #[test]
+    fn files_are_named_as_the_scene_sees_them() {
+        let name = |file: &str| name_of(Path::new(file), Path::new("/a/scene.toml"));
+        assert_eq!(name("/a/b/c.glb"), "b/c.glb");
+        assert_eq!(name("/d/c.glb"), "/d/c.glb");
+    }
+}

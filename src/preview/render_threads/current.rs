@@ -1,0 +1,177 @@
+//! A renderer at what is wanted: built anew where it must be, else edited.
+
+use std::sync::Arc;
+
+use super::{Level, Wanted};
+use crate::preview::composition::{Composition, Difference};
+use crate::renderer::{
+    Filter, FrameEdit, RenderError, Renderer, RendererOptions, Skip, Watcher, Without,
+};
+use crate::scene::{BackendChoice, EncodedPhoto, Exposure, Photo, Scene};
+
+/// The coarse picture's sides are the whole one's divided by this.
+const COARSE_DIVISOR: u32 = 4;
+/// Where the coarse picture ends: with more the pilot would measure first, which takes longer than the first picture.
+const COARSE_RAYS: u32 = 7;
+
+/// A renderer and what it stands at.
+pub(super) struct Current {
+    pub renderer: Renderer,
+    scene: Arc<Scene>,
+    composition: Composition,
+    has_real: bool,
+}
+
+/// Brings the renderer to what is wanted; what it was that changed, if the picture began anew.
+pub(super) fn take_up(
+    level: Level,
+    wanted: &Wanted,
+    current: &mut Option<Current>,
+    watcher: &Watcher<'_>,
+) -> Result<Option<&'static str>, RenderError> {
+    let has_real = wanted.view.needs_real();
+    let fits = |current: &Current| {
+        Arc::ptr_eq(&current.scene, &wanted.scene) && current.has_real == has_real
+    };
+    if let Some(current) = current.as_mut().filter(|current| fits(current)) {
+        let difference = Difference::between(&current.composition, &wanted.composition);
+        if difference.is_none() {
+            return Ok(None);
+        }
+        edit(&mut current.renderer, level, &difference, wanted, watcher)?;
+        current.composition = wanted.composition.clone();
+        return Ok(Some(difference.name()));
+    }
+    let mut scene = Scene::clone(&wanted.scene);
+    wanted.composition.apply(&mut scene);
+    if level == Level::Coarse {
+        shrink(&mut scene);
+    }
+    let options = RendererOptions {
+        guides: true,
+        real_everywhere: has_real,
+        filter: (level == Level::Coarse).then_some(Filter::Preview),
+        draft: level == Level::Coarse,
+        without: match level {
+            // Caustics come with the whole picture.
+            Level::Coarse => [Skip::Photons, Skip::Guide].into_iter().collect(),
+            Level::Fine => Without::default(),
+        },
+        ..RendererOptions::default()
+    };
+    // The memory of the scene before is free first.
+    *current = None;
+    *current = Some(Current {
+        renderer: Renderer::new(scene, options, watcher)?,
+        scene: wanted.scene.clone(),
+        composition: wanted.composition.clone(),
+        has_real,
+    });
+    Ok(Some("scene"))
+}
+
+fn edit(
+    renderer: &mut Renderer,
+    level: Level,
+    difference: &Difference,
+    wanted: &Wanted,
+    watcher: &Watcher<'_>,
+) -> Result<(), RenderError> {
+    let to = &wanted.composition;
+    for object in &difference.objects {
+        let placement = to.objects[*object].world_from_object();
+        renderer.set_object_transform(*object, placement, watcher)?;
+    }
+    if difference.environment
+        && let Some(form) = to.environment
+    {
+        renderer.set_environment(form.rotation_deg, form.scale, watcher)?;
+    }
+    if difference.transport {
+        renderer.set_transport(to.exposure, to.max_bounces, watcher)?;
+    }
+    if difference.samples && level == Level::Fine {
+        renderer.set_samples(to.rays_per_pixel, to.seed, watcher)?;
+    }
+    if difference.camera {
+        set_camera(renderer, level, to, watcher)?;
+    }
+    if difference.lens {
+        renderer.set_lens(to.lens.lens(), watcher)?;
+    }
+    Ok(())
+}
+
+/// The whole picture's coordinates begin at its camera, as those of the file's own render do: their last bits depend on it.
+fn set_camera(
+    renderer: &mut Renderer,
+    level: Level,
+    to: &Composition,
+    watcher: &Watcher<'_>,
+) -> Result<(), RenderError> {
+    let pose = to.camera.world_from_camera();
+    let scene = renderer.scene();
+    if level == Level::Coarse || scene.settings.exposure == Exposure::Auto {
+        return renderer.set_camera_pose(pose, watcher);
+    }
+    let mut camera = scene.camera.clone();
+    camera.world_from_camera = pose;
+    let edit = FrameEdit {
+        photo: None,
+        camera,
+        lens: to.lens.lens(),
+        camera_path: scene.camera_path.clone(),
+        time_secs: scene.shutter.map_or(0.0, |shutter| shutter.time_secs),
+        seed: to.seed,
+        anchor: Some(pose.w_axis.truncate()),
+    };
+    renderer.set_frame(edit, watcher)
+}
+
+/// A quarter of the width and height, the photograph averaged.
+fn shrink(scene: &mut Scene) {
+    let camera = &mut scene.camera;
+    let [width, height] = [camera.width, camera.height].map(|side| side.div_ceil(COARSE_DIVISOR));
+    let [x, y] = [(width, camera.width), (height, camera.height)]
+        .map(|(small, whole)| f64::from(small) / f64::from(whole));
+    (camera.fx, camera.cx) = (camera.fx * x, camera.cx * x);
+    (camera.fy, camera.cy) = (camera.fy * y, camera.cy * y);
+    (camera.width, camera.height) = (width, height);
+    scene.photo = scene
+        .photo
+        .as_ref()
+        .map(|photo| shrunk(photo, width, height));
+    scene.settings.rays_per_pixel = COARSE_RAYS;
+    // It is small, and a second device would have to be opened for it.
+    scene.settings.backend = BackendChoice::Cpu;
+}
+
+fn shrunk(photo: &Photo, width: u32, height: u32) -> Photo {
+    let range = |i: u32, small: u32, whole: u32| {
+        let begin = u64::from(i) * u64::from(whole) / u64::from(small);
+        let end = u64::from(i + 1) * u64::from(whole) / u64::from(small);
+        begin as usize..(end as usize).max(begin as usize + 1)
+    };
+    let mut linear = Vec::with_capacity(width as usize * height as usize);
+    for y in 0..height {
+        for x in 0..width {
+            let mut sum = glam::Vec3::ZERO;
+            let mut count = 0.0;
+            for row in range(y, height, photo.height) {
+                let begin = row * photo.width as usize;
+                for column in range(x, width, photo.width) {
+                    sum += glam::Vec3::from(photo.linear[begin + column]);
+                    count += 1.0;
+                }
+            }
+            linear.push((sum / count).to_array());
+        }
+    }
+    Photo {
+        width,
+        height,
+        linear,
+        encoded: EncodedPhoto::Linear,
+        tags: photo.tags.clone(),
+    }
+}

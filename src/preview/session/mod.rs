@@ -1,0 +1,519 @@
+//! A scene that is being composed: its file, its edits, and the picture of them. Everything that the window does but drawing.
+//!
+//! Nothing here waits: files are read on a thread of their own, pictures come from [`RenderThreads`].
+
+mod rewriting;
+mod unsaved;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use glam::DVec2;
+
+use super::composition::{Composition, rounded, virtual_objects};
+use super::document::Document;
+use super::geometry::{Geometry, Pick};
+use super::history::History;
+use super::render_threads::{RenderThreads, Shown, Wanted};
+use super::still::Still;
+use super::view::View;
+use super::watch::Watch;
+use crate::output::write_text;
+use crate::scene::{Scene, load_text};
+use unsaved::AUTOSAVE_EVERY;
+
+/// A text that was read, and what was edited since.
+#[derive(Clone, Debug, PartialEq)]
+struct Edited {
+    text: Arc<str>,
+    composition: Composition,
+}
+
+/// A scene as its text says.
+pub struct Loaded {
+    pub scene: Arc<Scene>,
+    pub geometry: Geometry,
+    document: Document,
+    /// As the text has it.
+    base: Composition,
+    text: Arc<str>,
+}
+
+/// A text on its way to a scene.
+struct Reading {
+    result: Receiver<Result<Box<Loaded>, String>>,
+    /// Edits upon it; `None`: as the text has it.
+    composition: Option<Composition>,
+    /// What undo brings back once it is read, by what change; `None`: undo or redo themselves.
+    change: Option<&'static str>,
+    /// It is what the disk holds.
+    is_saved: bool,
+}
+
+pub struct Session {
+    path: PathBuf,
+    wake: Arc<dyn Fn() + Send + Sync>,
+    renderers: RenderThreads,
+    loaded: Option<Box<Loaded>>,
+    present: Option<Edited>,
+    saved: Option<Edited>,
+    /// What the scene file held when it was last read or written.
+    disk: Arc<str>,
+    history: History<Edited>,
+    reading: Option<Reading>,
+    revision: u64,
+    view: View,
+    watch: Option<Watch>,
+    /// Of reading, saving or rendering; shown until the next success.
+    problem: Option<String>,
+    /// The scene file was changed by another program while there are unsaved edits.
+    has_conflict: bool,
+    /// Unsaved work of a run that ended without a word.
+    recovered: Option<String>,
+    autosaved: Option<(Edited, Instant)>,
+    still: Option<Still>,
+}
+
+impl Session {
+    /// Opens a scene file; it is read in the background.
+    ///
+    /// # Errors
+    /// The system gives no threads.
+    pub fn open(
+        path: &Path,
+        frame_time: Duration,
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> Result<Self, rayon::ThreadPoolBuildError> {
+        let wake: Arc<dyn Fn() + Send + Sync> = Arc::new(wake);
+        let woken = wake.clone();
+        let mut session = Self {
+            path: path.to_path_buf(),
+            wake,
+            renderers: RenderThreads::start(frame_time, move || woken())?,
+            loaded: None,
+            present: None,
+            saved: None,
+            disk: Arc::from(""),
+            history: History::default(),
+            reading: None,
+            revision: 0,
+            view: View::Picture,
+            watch: None,
+            problem: None,
+            has_conflict: false,
+            recovered: None,
+            autosaved: None,
+            still: None,
+        };
+        session.recovered = std::fs::read_to_string(session.autosave_path()).ok();
+        session.read_disk();
+        Ok(session)
+    }
+
+    /// Another scene file in its place; edits of this one are dropped.
+    pub fn switch(&mut self, path: &Path) {
+        self.discard_autosave();
+        self.path = path.to_path_buf();
+        (self.loaded, self.present, self.saved) = (None, None, None);
+        (self.watch, self.reading, self.problem) = (None, None, None);
+        self.has_conflict = false;
+        self.history.clear();
+        self.recovered = std::fs::read_to_string(self.autosave_path()).ok();
+        self.read_disk();
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub fn loaded(&self) -> Option<&Loaded> {
+        self.loaded.as_deref()
+    }
+
+    /// The state that is shown or on its way to be.
+    pub fn composition(&self) -> Option<&Composition> {
+        self.present.as_ref().map(|present| &present.composition)
+    }
+
+    pub fn shown(&self) -> Option<Arc<Shown>> {
+        self.renderers.shown()
+    }
+
+    pub fn renderers(&self) -> &RenderThreads {
+        &self.renderers
+    }
+
+    /// Counts the states that were shown.
+    pub fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    pub fn is_reading(&self) -> bool {
+        self.reading.is_some()
+    }
+
+    /// What is wrong, in one line.
+    pub fn problem(&self) -> Option<String> {
+        self.problem
+            .clone()
+            .or_else(|| self.renderers.error(self.revision))
+    }
+
+    pub fn has_conflict(&self) -> bool {
+        self.has_conflict
+    }
+
+    pub fn recovered(&self) -> bool {
+        self.recovered.is_some()
+    }
+
+    pub fn is_dirty(&self) -> bool {
+        self.present != self.saved
+    }
+
+    pub fn still(&self) -> Option<&Still> {
+        self.still.as_ref()
+    }
+
+    pub fn view(&self) -> View {
+        self.view
+    }
+
+    pub fn set_view(&mut self, view: View) {
+        if self.view != view {
+            self.view = view;
+            self.want();
+        }
+    }
+
+    /// Takes up what has happened meanwhile: files read, files changed. Called before every frame.
+    pub fn tick(&mut self, now: Instant) {
+        let result = self
+            .reading
+            .as_ref()
+            .and_then(|reading| reading.result.try_recv().ok());
+        if let Some(result) = result {
+            self.take_up(result, now);
+        }
+        let changed = self.watch.as_mut().map(|watch| watch.changed(now));
+        if let Some(changed) = changed.filter(|changed| !changed.is_empty()) {
+            self.files_changed(&changed);
+        }
+        self.autosave(now);
+    }
+
+    /// When [`Session::tick`] has something to do by itself.
+    pub fn tick_in(&self, now: Instant) -> Option<Duration> {
+        let watch = self.watch.as_ref().and_then(|watch| watch.look_in(now));
+        let autosave = self.is_dirty().then_some(AUTOSAVE_EVERY);
+        watch.into_iter().chain(autosave).min()
+    }
+
+    fn take_up(&mut self, result: Result<Box<Loaded>, String>, now: Instant) {
+        let Some(reading) = self.reading.take() else {
+            return;
+        };
+        let loaded = match result {
+            Ok(loaded) => loaded,
+            Err(problem) => {
+                self.problem = Some(problem);
+                self.watch_anew();
+                return;
+            }
+        };
+        self.problem = None;
+        let fits = |composition: &Composition| {
+            composition.objects.len() == loaded.base.objects.len()
+                && composition.environment.is_some() == loaded.base.environment.is_some()
+        };
+        let composition = reading.composition.filter(fits);
+        let edited = Edited {
+            text: loaded.text.clone(),
+            composition: composition.unwrap_or_else(|| loaded.base.clone()),
+        };
+        if reading.is_saved {
+            self.saved = Some(Edited {
+                composition: loaded.base.clone(),
+                ..edited.clone()
+            });
+            self.has_conflict = false;
+        }
+        if let (Some(before), Some(change)) = (self.present.take(), reading.change)
+            && before != edited
+        {
+            self.history.changed(before, change, now);
+            self.history.end_gesture();
+        }
+        self.present = Some(edited);
+        self.loaded = Some(loaded);
+        self.watch_anew();
+        self.want();
+    }
+
+    fn watch_anew(&mut self) {
+        let wake = self.wake.clone();
+        let inputs = self
+            .loaded
+            .as_ref()
+            .map(|loaded| loaded.scene.inputs.clone());
+        let files = inputs.unwrap_or_else(|| vec![self.path.clone()]);
+        match Watch::new(files, move || wake()) {
+            Ok(watch) => self.watch = Some(watch),
+            Err(error) => {
+                self.watch = None;
+                self.problem = Some(format!(
+                    "changes on disk are not noticed: {error}; use Reload"
+                ));
+            }
+        }
+    }
+
+    fn files_changed(&mut self, changed: &[PathBuf]) {
+        let same = |file: &PathBuf| file.canonicalize().ok() == self.path.canonicalize().ok();
+        let disk = std::fs::read_to_string(&self.path).ok();
+        let is_other = changed.iter().any(same) && disk.as_deref() != Some(&*self.disk);
+        if is_other {
+            match self.is_dirty() {
+                true => self.has_conflict = true,
+                false => self.read_disk(),
+            }
+        } else if let Some(present) = self.present.clone().filter(|_| !changed.iter().all(same)) {
+            // A mesh, or an image.
+            self.read(present.text, Some(present.composition), None, false);
+        }
+    }
+
+    /// Reads the scene file again; what was edited can be brought back by undo.
+    pub fn reload(&mut self) {
+        self.read_disk();
+    }
+
+    fn read_disk(&mut self) {
+        match std::fs::read(&self.path) {
+            // What is no text is refused with its place by the reader.
+            Ok(bytes) => {
+                let text: Arc<str> = Arc::from(String::from_utf8_lossy(&bytes));
+                self.disk = text.clone();
+                self.read(text, None, Some("reload"), true);
+            }
+            Err(error) => {
+                self.problem = Some(format!(
+                    "{}: cannot be read ({error}); expected a scene file; correct the path",
+                    self.path.display()
+                ));
+            }
+        }
+    }
+
+    fn read(
+        &mut self,
+        text: Arc<str>,
+        composition: Option<Composition>,
+        change: Option<&'static str>,
+        is_saved: bool,
+    ) {
+        self.problem = None;
+        let (sender, result) = channel();
+        let (path, wake) = (self.path.clone(), self.wake.clone());
+        thread::spawn(move || {
+            // Nobody waits for it if another text came meanwhile.
+            let _ = sender.send(load(&path, text));
+            wake();
+        });
+        self.reading = Some(Reading {
+            result,
+            composition,
+            change,
+            is_saved,
+        });
+    }
+
+    /// Changes what is shown; `what` names the gesture or slider, whose changes are undone together. Nothing happens before the scene is read.
+    pub fn edit(&mut self, what: &str, change: impl FnOnce(&mut Composition)) {
+        let Some(present) = &mut self.present else {
+            return;
+        };
+        let before = present.clone();
+        change(&mut present.composition);
+        if *present == before {
+            return;
+        }
+        self.history.changed(before.clone(), what, Instant::now());
+        self.show_from(&before.composition);
+    }
+
+    /// The next edit is undone by itself.
+    pub fn end_gesture(&mut self) {
+        self.history.end_gesture();
+    }
+
+    fn show_from(&mut self, before: &Composition) {
+        let (Some(loaded), Some(present)) = (&self.loaded, &self.present) else {
+            return;
+        };
+        if present.composition.needs_reading(before, &loaded.scene) {
+            let text = self.text().unwrap_or_default();
+            self.read(Arc::from(text), None, None, false);
+        } else {
+            self.want();
+        }
+    }
+
+    fn want(&mut self) {
+        let (Some(loaded), Some(present)) = (&self.loaded, &self.present) else {
+            return;
+        };
+        self.revision += 1;
+        self.renderers.want(Wanted {
+            revision: self.revision,
+            scene: loaded.scene.clone(),
+            composition: present.composition.clone(),
+            view: self.view,
+            since: Instant::now(),
+        });
+    }
+
+    pub fn can_undo(&self) -> bool {
+        self.history.can_undo()
+    }
+
+    pub fn can_redo(&self) -> bool {
+        self.history.can_redo()
+    }
+
+    pub fn undo(&mut self) {
+        if let Some(present) = self.present.clone()
+            && let Some(before) = self.history.undo(present)
+        {
+            self.go_to(before);
+        }
+    }
+
+    pub fn redo(&mut self) {
+        if let Some(present) = self.present.clone()
+            && let Some(after) = self.history.redo(present)
+        {
+            self.go_to(after);
+        }
+    }
+
+    fn go_to(&mut self, state: Edited) {
+        let same_text = (self.loaded.as_ref()).is_some_and(|loaded| loaded.text == state.text);
+        if !same_text {
+            self.read(state.text, Some(state.composition), None, false);
+        } else if let Some(before) = self.present.replace(state) {
+            self.show_from(&before.composition);
+        }
+    }
+
+    /// The scene file's text with all edits; `None` before the scene is read.
+    pub fn text(&self) -> Option<String> {
+        let (loaded, present) = (self.loaded.as_ref()?, self.present.as_ref()?);
+        let mut document = loaded.document.clone();
+        document.write(&loaded.base, &present.composition, &loaded.scene);
+        Some(document.text())
+    }
+
+    /// Writes the edits into the scene file.
+    pub fn save(&mut self) {
+        let Some(text) = self.text() else {
+            return;
+        };
+        match write_text(&self.path, &text) {
+            Ok(()) => {
+                self.disk = Arc::from(text);
+                self.saved = self.present.clone();
+                self.has_conflict = false;
+                self.problem = None;
+                self.discard_autosave();
+            }
+            Err(error) => self.problem = Some(error.to_string()),
+        }
+    }
+
+    /// What stands under a position of the photograph, pixels.
+    pub fn pick(&self, pixel: DVec2) -> Option<Pick> {
+        let (loaded, composition) = (self.loaded.as_ref()?, self.composition()?);
+        (loaded.geometry).pick(&loaded.scene.camera, composition, pixel)
+    }
+
+    /// Focuses on what stands there.
+    pub fn focus_at(&mut self, pixel: DVec2) {
+        if let Some(pick) = self.pick(pixel) {
+            self.end_gesture();
+            self.edit("focus", |composition| {
+                let least = composition.lens.least_focus_m();
+                composition.lens.focus_distance_m = rounded(pick.depth_m, 1e-4).max(least);
+            });
+            self.end_gesture();
+        }
+    }
+
+    /// Sets an object down on the real surface there.
+    pub fn rest_at(&mut self, object: usize, pixel: DVec2) {
+        let (Some(loaded), Some(composition)) = (&self.loaded, self.composition()) else {
+            return;
+        };
+        let camera = &loaded.scene.camera;
+        let rested = (loaded.geometry).rest_at(camera, composition, object, pixel);
+        if let Some(placement) = rested {
+            self.edit("drag", |composition| {
+                composition.objects[object] = placement
+            });
+        }
+    }
+
+    /// The object of that name, or that number among the virtual ones, from 0.
+    pub fn object(&self, name: &str) -> Option<usize> {
+        let scene = &self.loaded.as_ref()?.scene;
+        let number = name.parse::<usize>().ok();
+        let by_name = virtual_objects(scene).find(|index| scene.objects[*index].name == name);
+        by_name.or_else(|| virtual_objects(scene).nth(number?))
+    }
+
+    /// The scene with its edits.
+    pub fn edited_scene(&self) -> Option<Scene> {
+        let mut scene = Scene::clone(&self.loaded.as_ref()?.scene);
+        self.composition()?.apply(&mut scene);
+        Some(scene)
+    }
+
+    /// Renders the present state at full quality, beside the preview.
+    pub fn render_still(&mut self, path: PathBuf) {
+        let Some(scene) = self.edited_scene() else {
+            return;
+        };
+        let wake = self.wake.clone();
+        match Still::start(scene, path, move || wake()) {
+            Ok(still) => self.still = Some(still),
+            Err(problem) => self.problem = Some(problem),
+        }
+    }
+
+    /// The command line that renders the saved scene.
+    pub fn command(&self) -> String {
+        let path = self.path.to_string_lossy();
+        let is_plain = |c: char| c.is_alphanumeric() || "/._-+".contains(c);
+        match path.chars().all(is_plain) {
+            true => format!("mixray render {path}"),
+            false => format!("mixray render '{}'", path.replace('\'', r"'\''")),
+        }
+    }
+}
+
+/// Reads a text as the scene file of that path.
+fn load(path: &Path, text: Arc<str>) -> Result<Box<Loaded>, String> {
+    let scene = load_text(path, &text).map_err(|error| error.to_string())?;
+    let document = Document::parse(&text).map_err(|error| error.to_string())?;
+    let geometry = Geometry::build(&scene).map_err(|error| error.to_string())?;
+    Ok(Box::new(Loaded {
+        base: document.composition(&scene),
+        scene: Arc::new(scene),
+        geometry,
+        document,
+        text,
+    }))
+}
