@@ -106,7 +106,8 @@ impl Renderer {
         (environment.rotation_deg, environment.scale) = (rotation_deg, scale);
         self.core.packed.set_environment(&self.core.scene);
         self.core.pack_moving(watcher)?;
-        self.restart(true, Changed::All, watcher)
+        let estimates_albedo = !self.core.options.draft;
+        self.restart(estimates_albedo, Changed::All, watcher)
     }
 
     /// Another exposure and depth of paths. No tree is built.

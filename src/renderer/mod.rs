@@ -78,7 +78,8 @@ pub struct RendererOptions {
     pub without: Without,
     /// Pictures show the difference filtered; the film is not touched.
     pub filter: Option<Filter>,
-    /// For a first look: [`Renderer::backdrop_share`], which only tells, is not estimated.
+    /// For a first look: [`Renderer::backdrop_share`], which only tells, is not estimated; albedo from the photograph stays that of the first
+    /// environment.
     pub draft: bool,
 }
 

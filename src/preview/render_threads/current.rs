@@ -14,6 +14,9 @@ const COARSE_DIVISOR: u32 = 4;
 /// Where the coarse picture ends: with more the pilot would measure first, which takes longer than the first picture.
 const COARSE_RAYS: u32 = 7;
 
+/// The coarse picture's indirect light is no brighter: one ray would show it as dots.
+const COARSE_CLAMP: f32 = 1.0;
+
 /// A renderer and what it stands at.
 pub(super) struct Current {
     pub renderer: Renderer,
@@ -142,6 +145,7 @@ fn shrink(scene: &mut Scene) {
         .as_ref()
         .map(|photo| shrunk(photo, width, height));
     scene.settings.rays_per_pixel = COARSE_RAYS;
+    scene.settings.clamp_indirect = scene.settings.clamp_indirect.min(COARSE_CLAMP);
     // It is small, and a second device would have to be opened for it.
     scene.settings.backend = BackendChoice::Cpu;
 }
