@@ -205,8 +205,8 @@ fn rough_surfaces_show_their_single_scattering_albedo(backend: BackendChoice) {
 fn rough_white_objects_lose_nothing(backend: BackendChoice) {
     let mut lost = 0.0_f64;
     for material in ["metallic = 1.0", "transmission = 1.0, thin_walled = true"] {
-        for roughness in [0.1, 0.6, 1.0] {
-            for angle_deg in [0.0, 80.0] {
+        for roughness in [0.1, 0.35, 0.6, 0.8, 1.0] {
+            for angle_deg in [0.0, 50.0, 80.0] {
                 let material = format!("{material}, roughness = {roughness:?}");
                 let mut scene = tilted_quad(angle_deg, &material);
                 let (single, _) = shown_albedo(&scene, backend);
