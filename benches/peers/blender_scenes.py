@@ -6,9 +6,10 @@ Each has a ground and a block that are real (catchers), and things that are adde
 import math
 
 import bpy
-from mathutils import Vector
+import numpy as np
+from mathutils import Matrix, Vector
 
-WIDTH, HEIGHT = 256, 192
+WIDTH, HEIGHT = 192, 144
 
 
 def empty_scene(*, samples):
@@ -93,6 +94,87 @@ def aim(thing, location, target):
     thing.rotation_euler = (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
 
 
+def tracked(folder):
+    """A movie clip of twelve frames with a distorting lens, its markers, and Blender's own solve, which moves the camera; a soft box of light.
+
+    Returns the scene and the clip; the frames' pictures are black until they are rendered.
+    """
+    scene = empty_scene(samples=256)
+    scene.frame_start, scene.frame_end, scene.render.fps = 1, 12, 24
+    ground()
+    box("block", centre=(-0.5, 0.5, 0.3), size=(0.4, 0.4, 0.6), color=(0.6, 0.3, 0.2), is_real=True)
+    box("cube", centre=(0.3, -0.1, 0.2), size=(0.4, 0.3, 0.4), color=(0.2, 0.5, 0.7))
+    ball("ball", centre=(-0.3, -0.4, 0.2), radius=0.2, color=(0.8, 0.7, 0.2))
+    lamp("AREA", location=(0.8, -0.8, 2.2), energy=80.0, shape="SQUARE", size=0.6)
+    seen = camera(location=(0.0, -3.0, 1.2), target=(0.0, 0.0, 0.2), lens_mm=32.0)
+    black = bpy.data.images.new("black", WIDTH, HEIGHT)
+    black.file_format = "PNG"
+    for frame in range(scene.frame_start, scene.frame_end + 1):
+        black.filepath_raw = str(folder / f"plate_{frame:04}.png")
+        black.save()
+    clip = bpy.data.movieclips.load(str(folder / "plate_0001.png"))
+    lens = clip.tracking.camera
+    lens.sensor_width, lens.units, lens.focal_length = 36.0, "MILLIMETERS", 32.0
+    lens.k1, lens.k2 = 0.1, -0.02
+    points = _add_markers(clip, seen)
+    _solve(clip)
+    bundles = [tuple(track.bundle) for track in clip.tracking.tracks]
+    seen.matrix_world = _similarity(np.array(bundles), np.array([tuple(p) for p in points]))
+    solver = seen.constraints.new("CAMERA_SOLVER")
+    solver.use_active_clip, solver.clip = False, clip
+    background = seen.data.background_images.new()
+    background.source, background.clip = "MOVIE_CLIP", clip
+    return scene, clip
+
+
+def _add_markers(clip, seen):
+    """Points of the scene where the lens shows them along a way of the camera, 0.02 px beside; returns the points."""
+    random = np.random.default_rng(1)
+    spread = random.uniform((-1.0, -1.0, 0.0), (1.0, 1.0, 0.8), (24, 3))
+    points = [Vector(p) for p in spread.tolist()]
+    focal, (k1, k2) = clip.tracking.camera.focal_length_pixels, (clip.tracking.camera.k1, clip.tracking.camera.k2)
+    tracks = [clip.tracking.tracks.new(name=f"point {i}", frame=1) for i in range(len(points))]
+    for frame in range(1, 13):
+        way = (frame - 1) / 11
+        aim(seen, (-0.8 + 1.6 * way, -3.0 + 0.3 * way, 1.2 + 0.2 * way), (0.0, 0.0, 0.2))
+        bpy.context.view_layer.update()
+        camera_from_world = seen.matrix_world.inverted()
+        for track, point in zip(tracks, points):
+            x, y, z = camera_from_world @ point
+            x, y = x / -z, y / -z
+            factor = 1.0 + (x * x + y * y) * (k1 + (x * x + y * y) * k2)
+            off = random.normal(0.0, 0.02, 2)
+            co = ((focal * x * factor + off[0]) / WIDTH + 0.5, (focal * y * factor + off[1]) / HEIGHT + 0.5)
+            track.markers.insert_frame(frame, co=co)
+    return points
+
+
+def _solve(clip):
+    """Blender's solver works in a clip editor alone."""
+    tracked_object = clip.tracking.objects[0]
+    tracked_object.keyframe_a, tracked_object.keyframe_b = 1, 12
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    area.type = "CLIP_EDITOR"
+    area.spaces.active.clip = clip
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region, space_data=area.spaces.active):
+        bpy.ops.clip.solve_camera()
+
+
+def _similarity(points, targets):
+    """The rotation, scale and translation that bring points to targets best (Umeyama 1991)."""
+    p, t = points - points.mean(0), targets - targets.mean(0)
+    u, s, vt = np.linalg.svd(t.T @ p)
+    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+    rotation = u @ flip @ vt
+    scale = (s * np.diag(flip)).sum() / (p**2).sum()
+    matrix = np.eye(4)
+    matrix[:3, :3] = scale * rotation
+    matrix[:3, 3] = targets.mean(0) - scale * rotation @ points.mean(0)
+    return Matrix(matrix.tolist())
+
+
 def camera(*, location, target, lens_mm):
     data = bpy.data.cameras.new("camera")
     data.lens = lens_mm
@@ -111,6 +193,8 @@ def aperture():
     box("cube", centre=(0.25, -0.2, 0.15), size=(0.3, 0.3, 0.3), color=(0.2, 0.5, 0.7))
     focus = ball("ball", centre=(-0.35, -0.35, 0.2), radius=0.2, color=(0.8, 0.7, 0.2))
     ball("far ball", centre=(0.9, 1.6, 0.2), radius=0.2, color=(0.7, 0.2, 0.6))
+    # Small and far out of focus: it shows the aperture's shape.
+    ball("bead", centre=(0.4, -1.4, 0.75), radius=0.01, color=(0.9, 0.9, 0.9))
     area = lamp("AREA", location=(1.2, -0.6, 2.4), energy=60.0, shape="RECTANGLE", size=0.8, size_y=0.5, color=(1.0, 0.9, 0.8))
     area.scale = (1.5, 0.5, 1.0)
     lamp("SPOT", location=(-1.8, -0.8, 2.0), energy=120.0, shadow_soft_size=0.0, spot_size=math.radians(50), spot_blend=0.3)
