@@ -83,7 +83,7 @@ class Cycles:
 def distortion_map(clip, folder):
     """Where each pixel of the lens's picture, OVERSIZE times larger, is in the pinhole's: pixels from the top left, by Blender's compositor.
 
-    Its node moves a picture by a pixel even where the lens bends nothing (Blender 5.0.1); that is taken off.
+    Its node bends what is a pixel beside (Blender 5.0.1): a lens that bends nothing tells by how much, and the map is moved back.
     """
     lens = clip.tracking.camera
     given = lens.k1, lens.k2
@@ -93,7 +93,9 @@ def distortion_map(clip, folder):
     lens.k1, lens.k2 = given
     j, i = np.indices(x.shape)
     middle = x.shape[0] // 2, x.shape[1] // 2
-    return x - (x0 - i - 0.5)[middle], y - (y0 - j - 0.5)[middle]
+    beside_x, beside_y = round((x0 - i - 0.5)[middle]), round((y0 - j - 0.5)[middle])
+    from_row, from_column = np.clip(j - beside_y, 0, x.shape[0] - 1), np.clip(i - beside_x, 0, x.shape[1] - 1)
+    return x[from_row, from_column], y[from_row, from_column]
 
 
 def _through_node(clip, folder):

@@ -18,6 +18,7 @@ def export_light(thing, matrix, report):
     color, power_w = color_of(light), light.energy
     _note_what_is_lost(thing, report)
     if light.type == "POINT" and light.shadow_soft_size > 0.0:
+        report.add(thing.name, "it is a ball that shines, and stops the light of other lamps")
         entry = convert.bulb(matrix, color=color, power_w=power_w, radius_m=light.shadow_soft_size)
         return side, {"name": thing.name, **entry}
     if light.type == "POINT":
