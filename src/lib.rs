@@ -40,6 +40,9 @@ pub mod accel;
 #[cfg(feature = "bench")]
 #[doc(hidden)]
 pub mod bench;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod blender;
 #[doc(hidden)]
 pub mod camera;
 #[cfg(feature = "cli")]

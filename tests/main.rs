@@ -3,6 +3,7 @@
 mod architecture;
 mod backends;
 mod bench;
+mod blender;
 mod cli;
 mod faults;
 mod files;

@@ -8,6 +8,7 @@ mod antialias;
 mod bench;
 mod cartoon;
 mod compare;
+mod export_blender;
 mod goal_flags;
 mod info;
 mod interrupt;
@@ -63,6 +64,7 @@ enum Command {
     Antialias(antialias::Arguments),
     MotionBlur(motion_blur::Arguments),
     Compare(compare::Arguments),
+    ExportBlender(export_blender::Arguments),
     Info(info::Arguments),
 }
 
@@ -127,6 +129,9 @@ fn run_command() -> ExitCode {
         Command::Antialias(arguments) => all_threads().and_then(|()| antialias::run(&arguments)),
         Command::MotionBlur(arguments) => all_threads().and_then(|()| motion_blur::run(&arguments)),
         Command::Compare(arguments) => all_threads().and_then(|()| compare::run(&arguments)),
+        Command::ExportBlender(arguments) => {
+            all_threads().and_then(|()| export_blender::run(&arguments))
+        }
         Command::Info(arguments) => all_threads().and_then(|()| info::run(&arguments)),
     };
     match result {
