@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 /// Half of a window's side, pixels: how far an edge has to be straight.
-const HALF: i32 = 12;
+const HALF: i32 = 10;
 /// From one window to the next, pixels.
 const STRIDE: i32 = 8;
 /// Furthest distance from the edge that is looked at, pixels.
@@ -20,9 +20,9 @@ const PLATEAU: f64 = 5.5;
 /// Smallest step, linear.
 const LEAST_CONTRAST: f64 = 0.03;
 /// Largest deviation of a row's centroid from the line, root mean square, pixels.
-const CROOKED_PX: f64 = 0.3;
+const CROOKED_PX: f64 = 0.5;
 /// Largest deviation on the sides, in steps.
-const UNEVEN: f64 = 0.08;
+const UNEVEN: f64 = 0.15;
 /// Linear values from here on may be clipped.
 const CLIPPED: f32 = 0.97;
 
@@ -225,7 +225,7 @@ impl Pixels<'_> {
                     return None;
                 }
                 let value = self.at(x + dx, y + dy);
-                if value.iter().any(|v| *v >= CLIPPED || *v <= 0.0) {
+                if value[1] <= 0.0 || value.iter().any(|v| *v >= CLIPPED) {
                     return None;
                 }
                 counts[bin as usize] += 1;
@@ -239,9 +239,9 @@ impl Pixels<'_> {
             return None;
         }
         let profiles = [0, 1, 2].map(|c| {
-            normalised(std::array::from_fn(|bin| {
-                sums[bin][c] / f64::from(counts[bin])
-            }))
+            let means = std::array::from_fn(|bin| sums[bin][c] / f64::from(counts[bin]));
+            // The other channels' steps may be small and their noise large.
+            normalised(means, if c == 1 { UNEVEN } else { 3.0 * UNEVEN })
         });
         let [Some(red), Some(green), Some(blue)] = profiles else {
             return None;
@@ -267,8 +267,8 @@ impl Pixels<'_> {
     }
 }
 
-/// From 0 to 1, if there is a step, even on both sides.
-fn normalised(profile: [f64; BINS]) -> Option<[f64; BINS]> {
+/// From 0 to 1, if there is a step, and its sides deviate by no more than `uneven` steps.
+fn normalised(profile: [f64; BINS], uneven: f64) -> Option<[f64; BINS]> {
     let side = |wanted: &dyn Fn(f64) -> bool| {
         let values: Vec<f64> = (0..BINS)
             .filter(|bin| wanted(distance_px(*bin)))
@@ -282,8 +282,8 @@ fn normalised(profile: [f64; BINS]) -> Option<[f64; BINS]> {
     let (dark, dark_spread) = side(&|d| d < -PLATEAU);
     let (bright, bright_spread) = side(&|d| d > PLATEAU);
     let step = bright - dark;
-    let even = dark_spread.max(bright_spread) < UNEVEN * step;
-    (step > LEAST_CONTRAST && even).then(|| profile.map(|value| (value - dark) / step))
+    let even = dark_spread.max(bright_spread) < uneven * step;
+    (step > 0.5 * LEAST_CONTRAST && even).then(|| profile.map(|value| (value - dark) / step))
 }
 
 /// Where a profile passes `level`, from the middle outwards, pixels.

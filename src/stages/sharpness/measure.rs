@@ -7,14 +7,16 @@ use super::model::Sharpened;
 /// Fewer edges in focus tell nothing.
 const FEWEST: usize = 5;
 /// Fewer edges in one half of the picture do not tell the centre from the corners.
-const FEWEST_OF_HALF: usize = 12;
+const FEWEST_OF_HALF: usize = 40;
 /// Share of the edges, the sharpest left out, that count as in focus: softer ones are out of focus, or round.
 const IN_FOCUS: std::ops::Range<f64> = 0.05..0.4;
+/// Fewer edges in focus do not tell lateral colour.
+const FEWEST_OF_LATERAL: usize = 40;
 /// How much softer the outer half has to be.
 const SOFTER: f64 = 1.1;
 /// Smallest shift of a channel in the corner that is told, pixels, and in its standard errors.
 const LEAST_SHIFT_PX: f64 = 0.05;
-const LEAST_ERRORS: f64 = 4.0;
+const LEAST_ERRORS: f64 = 6.0;
 
 /// What a photograph's edges show.
 #[derive(Clone, Debug)]
@@ -165,7 +167,8 @@ fn lateral(edges: &[Edge], size: (u32, u32), channel: usize) -> f32 {
         / squares;
     let rest = points.iter().map(|(along, s)| (s - shift * along).powi(2));
     let error = (rest.sum::<f64>() / points.len() as f64 / squares).sqrt();
-    if shift.abs() < LEAST_SHIFT_PX || shift.abs() < LEAST_ERRORS * error {
+    let is_known = points.len() >= FEWEST_OF_LATERAL;
+    if !is_known || shift.abs() < LEAST_SHIFT_PX || shift.abs() < LEAST_ERRORS * error {
         return 0.0;
     }
     shift.clamp(-4.0, 4.0) as f32

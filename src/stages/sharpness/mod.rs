@@ -16,8 +16,6 @@ mod measure;
 mod model;
 pub(super) mod settings;
 mod stage;
-#[cfg(test)]
-mod tests;
 
 pub use edges::{Edge, edges_of};
 pub use measure::{Measured, NoEdges, measure};
@@ -218,3 +216,6 @@ fn taps(variance: f32, shift: f32, reach: u32) -> [f32; TAPS as usize] {
     }
     taps
 }
+
+#[cfg(test)]
+mod tests;

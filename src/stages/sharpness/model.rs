@@ -46,7 +46,7 @@ impl Sharpened {
         for (step, around) in [(0.2, 10.0), (0.05, 0.25), (0.01, 0.06)] {
             let centre = best.1;
             let sigmas = candidates(centre.sigma_px, around, step, 0.0);
-            let radii = candidates(centre.radius_px, around, 2.0 * step, 0.4);
+            let radii = candidates(centre.radius_px, around, 2.0 * step, 0.8);
             for sigma_px in sigmas {
                 let core = edge(sigma_px.powi(2));
                 for radius_px in radii.clone() {

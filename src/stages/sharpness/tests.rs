@@ -108,3 +108,111 @@ fn energy_is_kept() {
     let most = picture.linear.iter().map(|v| v[0]).fold(0.0, f32::max);
     assert!(most > 2.05, "control: it is sharpened, {most}");
 }
+
+/// A photograph of slanted squares, drawn by area coverage eight times finer, gone through `spread` alone.
+fn squares(spread: &PointSpread) -> Picture {
+    const FINE: i32 = 8;
+    let (width, height) = (320, 240);
+    let linear = (0..width * height)
+        .map(|i| {
+            let (x, y) = (i % width, i / width);
+            let mut inside = 0;
+            for sub in 0..FINE * FINE {
+                let at = |pixel: i32, sub: i32| f64::from(pixel) + (f64::from(sub) + 0.5) / 8.0;
+                let (u, v) = (at(x, sub % FINE), at(y, sub / FINE));
+                // Turned by about five degrees.
+                let (a, b) = (u + 0.09 * v, v - 0.09 * u);
+                let cell = |t: f64| (t + 400.0) % 80.0 < 40.0;
+                inside += i32::from(cell(a) != cell(b));
+            }
+            [0.1 + 0.5 * inside as f32 / (FINE * FINE) as f32; 3]
+        })
+        .collect();
+    let mut picture = Picture {
+        width: width as u32,
+        height: height as u32,
+        linear,
+    };
+    let mask = vec![1.0; picture.linear.len()];
+    let light = VirtualLight {
+        photo: None,
+        mask: &mask,
+        ratio: None,
+    };
+    sharpen(&mut picture, &light, spread);
+    picture
+}
+
+fn measured(picture: &Picture) -> super::Measured {
+    super::measure(&picture.linear, (picture.width, picture.height)).unwrap()
+}
+
+/// What one picture's edges show, given to ideal edges, shows again.
+#[test]
+fn the_measured_sharpness_is_that_of_the_picture() {
+    for (sigma, sharpening) in [(0.8, 0.0), (1.2, 0.0), (1.0, 1.2)] {
+        let known = PointSpread {
+            sharpening,
+            sharpening_radius_px: 1.5,
+            ..PointSpread::gaussian(sigma)
+        };
+        let photo = measured(&squares(&known));
+        let again = measured(&squares(&photo.spread));
+        let ratio = again.edge_spread_px / photo.edge_spread_px;
+        assert!((ratio - 1.0).abs() < 0.05, "{photo:?} {again:?}");
+        assert!(
+            (again.overshoot - photo.overshoot).abs() < 0.02,
+            "{photo:?} {again:?}"
+        );
+        assert!(photo.spread.lateral_px == [0.0; 2], "{photo:?}");
+        let ideal = measured(&squares(&PointSpread::gaussian(0.0)));
+        assert!(ideal.edge_spread_px < 0.8 * photo.edge_spread_px, "control");
+    }
+}
+
+#[test]
+fn lateral_colour_is_found() {
+    let known = PointSpread {
+        lateral_px: [0.8, -0.5],
+        ..PointSpread::gaussian(0.9)
+    };
+    let found = measured(&squares(&known)).spread.lateral_px;
+    for (found, known) in found.into_iter().zip(known.lateral_px) {
+        assert!((found - known).abs() < 0.1, "{found} {known}");
+    }
+}
+
+#[test]
+fn a_picture_without_edges_is_refused() {
+    let flat = vec![[0.3; 3]; 200 * 200];
+    let problem = super::measure(&flat, (200, 200)).unwrap_err().to_string();
+    assert!(problem.contains("give numbers"), "{problem}");
+}
+
+/// The point spread of each of five photographs gives ideal edges the spread of that photograph's own.
+#[test]
+fn virtual_edges_are_as_soft_as_five_photographs() {
+    let data = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    for name in [
+        "tum_desk_rgbd/photo.png",
+        "polyu_noise_pairs/Canon5D2_5_160_6400_circuit_11_mean.jpg",
+        "polyu_noise_pairs/Canon5D2_5_200_3200_fruit_11_mean.jpg",
+        "polyu_noise_pairs/NikonD800_4-5_160_1800_classroom_15_mean.jpg",
+        "polyu_noise_pairs/NikonD800_8_100_6400_bulletin_3_mean.jpg",
+    ] {
+        let path = data.join(name);
+        if !path.is_file() {
+            eprintln!("{name} is absent: nothing is tested on it");
+            continue;
+        }
+        let (photo, _) = crate::scene::Photo::read(&path).unwrap();
+        let real = super::measure(&photo.linear, (photo.width, photo.height)).unwrap();
+        let virtually = measured(&squares(&real.spread));
+        eprintln!(
+            "{name}: {:.2} px, {:.3}; virtual {:.2} px, {:.3}; {real:?}",
+            real.edge_spread_px, real.overshoot, virtually.edge_spread_px, virtually.overshoot
+        );
+        let ratio = virtually.edge_spread_px / real.edge_spread_px;
+        assert!((ratio - 1.0).abs() < 0.1, "{name}: {ratio}");
+    }
+}
