@@ -23,6 +23,7 @@ mod progress;
 mod render;
 mod scene_flags;
 mod sequence;
+mod sharpness;
 mod stage_device;
 mod summary;
 mod terminal;
@@ -61,6 +62,7 @@ enum Command {
     Bench(Box<bench::Arguments>),
     Cartoon(cartoon::Arguments),
     Noise(noise::Arguments),
+    Sharpness(sharpness::Arguments),
     Antialias(antialias::Arguments),
     MotionBlur(motion_blur::Arguments),
     Compare(compare::Arguments),
@@ -126,6 +128,7 @@ fn run_command() -> ExitCode {
         Command::Bench(arguments) => bench::run(*arguments),
         Command::Cartoon(arguments) => all_threads().and_then(|()| cartoon::run(&arguments)),
         Command::Noise(arguments) => all_threads().and_then(|()| noise::run(&arguments)),
+        Command::Sharpness(arguments) => all_threads().and_then(|()| sharpness::run(&arguments)),
         Command::Antialias(arguments) => all_threads().and_then(|()| antialias::run(&arguments)),
         Command::MotionBlur(arguments) => all_threads().and_then(|()| motion_blur::run(&arguments)),
         Command::Compare(arguments) => all_threads().and_then(|()| compare::run(&arguments)),
