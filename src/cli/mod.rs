@@ -15,6 +15,8 @@ mod interrupt;
 mod layers;
 mod merge;
 mod motion_blur;
+#[cfg(feature = "start")]
+mod new;
 mod noise;
 mod picture_flags;
 mod pool;
@@ -57,6 +59,8 @@ enum Command {
     Sequence(sequence::Arguments),
     #[cfg(feature = "track")]
     Track(Box<track::Arguments>),
+    #[cfg(feature = "start")]
+    New(Box<new::Arguments>),
     Merge(merge::Arguments),
     #[cfg(feature = "bench")]
     Bench(Box<bench::Arguments>),
@@ -123,6 +127,8 @@ fn run_command() -> ExitCode {
         Command::Sequence(arguments) => sequence::run(&arguments),
         #[cfg(feature = "track")]
         Command::Track(arguments) => track::run(&arguments),
+        #[cfg(feature = "start")]
+        Command::New(arguments) => new::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
         #[cfg(feature = "bench")]
         Command::Bench(arguments) => bench::run(*arguments),

@@ -235,7 +235,10 @@ fn numbers<const N: usize>(words: &[&str], what: &str) -> std::result::Result<[f
 }
 
 /// World-from-camera of rows, made exactly rigid.
-fn pose_of_rows(rows: [[f64; 4]; 4]) -> std::result::Result<DMat4, String> {
+///
+/// # Errors
+/// Why they are no rotation and translation.
+pub(crate) fn pose_of_rows(rows: [[f64; 4]; 4]) -> std::result::Result<DMat4, String> {
     for x in rows.as_flattened() {
         finite(*x, "an element of the pose")?;
     }
