@@ -42,6 +42,8 @@ pub mod accel;
 pub mod bench;
 #[doc(hidden)]
 pub mod camera;
+#[doc(hidden)]
+pub mod check;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;

@@ -3,6 +3,7 @@
 mod architecture;
 mod backends;
 mod bench;
+mod checking;
 mod cli;
 mod faults;
 mod files;

@@ -7,7 +7,9 @@ mod antialias;
 #[cfg(feature = "bench")]
 mod bench;
 mod cartoon;
+mod check;
 mod compare;
+mod file_info;
 mod goal_flags;
 mod info;
 mod interrupt;
@@ -15,6 +17,7 @@ mod layers;
 mod merge;
 mod motion_blur;
 mod noise;
+mod pick;
 mod picture_flags;
 mod pool;
 mod preview;
@@ -52,6 +55,8 @@ struct Arguments {
 enum Command {
     Render(render::Arguments),
     Preview(preview::Arguments),
+    Check(check::Arguments),
+    Pick(pick::Arguments),
     Sequence(sequence::Arguments),
     #[cfg(feature = "track")]
     Track(Box<track::Arguments>),
@@ -116,6 +121,8 @@ fn run_command() -> ExitCode {
     let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Preview(arguments) => preview::run(&arguments),
+        Command::Check(arguments) => all_threads().and_then(|()| check::run(&arguments)),
+        Command::Pick(arguments) => all_threads().and_then(|()| pick::run(&arguments)),
         Command::Sequence(arguments) => sequence::run(&arguments),
         #[cfg(feature = "track")]
         Command::Track(arguments) => track::run(&arguments),
