@@ -45,6 +45,8 @@ pub mod bench;
 pub mod blender;
 #[doc(hidden)]
 pub mod camera;
+#[doc(hidden)]
+pub mod check;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;

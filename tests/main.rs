@@ -4,6 +4,7 @@ mod architecture;
 mod backends;
 mod bench;
 mod blender;
+mod checking;
 mod cli;
 mod faults;
 mod files;

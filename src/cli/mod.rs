@@ -7,8 +7,10 @@ mod antialias;
 #[cfg(feature = "bench")]
 mod bench;
 mod cartoon;
+mod check;
 mod compare;
 mod export_blender;
+mod file_info;
 mod goal_flags;
 mod info;
 mod interrupt;
@@ -18,6 +20,7 @@ mod motion_blur;
 #[cfg(feature = "start")]
 mod new;
 mod noise;
+mod pick;
 mod picture_flags;
 mod pool;
 mod preview;
@@ -56,6 +59,8 @@ struct Arguments {
 enum Command {
     Render(render::Arguments),
     Preview(preview::Arguments),
+    Check(check::Arguments),
+    Pick(pick::Arguments),
     Sequence(sequence::Arguments),
     #[cfg(feature = "track")]
     Track(Box<track::Arguments>),
@@ -124,6 +129,8 @@ fn run_command() -> ExitCode {
     let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Preview(arguments) => preview::run(&arguments),
+        Command::Check(arguments) => all_threads().and_then(|()| check::run(&arguments)),
+        Command::Pick(arguments) => all_threads().and_then(|()| pick::run(&arguments)),
         Command::Sequence(arguments) => sequence::run(&arguments),
         #[cfg(feature = "track")]
         Command::Track(arguments) => track::run(&arguments),
