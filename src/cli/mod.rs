@@ -6,8 +6,11 @@
 mod antialias;
 #[cfg(feature = "bench")]
 mod bench;
+mod bundle;
 mod cartoon;
 mod compare;
+mod forwarded;
+mod frame_flags;
 mod goal_flags;
 mod info;
 mod interrupt;
@@ -23,6 +26,7 @@ mod render;
 mod scene_flags;
 mod sequence;
 mod stage_device;
+mod submit;
 mod summary;
 mod terminal;
 mod threads;
@@ -34,7 +38,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::files;
 use crate::scene::Photo;
@@ -56,6 +60,8 @@ enum Command {
     #[cfg(feature = "track")]
     Track(Box<track::Arguments>),
     Merge(merge::Arguments),
+    Submit(Box<submit::Arguments>),
+    Bundle(bundle::Arguments),
     #[cfg(feature = "bench")]
     Bench(Box<bench::Arguments>),
     Cartoon(cartoon::Arguments),
@@ -107,7 +113,9 @@ const MESA_NO_DEVICE_SELECTION: &str = "NODEVICE_SELECT";
 
 fn run_command() -> ExitCode {
     interrupt::survive_file_limits();
-    let arguments = Arguments::try_parse_from(words(std::env::args_os()))
+    let (arguments, matches) = Arguments::command()
+        .try_get_matches_from(words(std::env::args_os()))
+        .and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, matches)))
         .unwrap_or_else(|error| end_with_usage(error));
     // The window writes the scene that it reads.
     if !matches!(arguments.command, Command::Preview(_)) {
@@ -120,6 +128,11 @@ fn run_command() -> ExitCode {
         #[cfg(feature = "track")]
         Command::Track(arguments) => track::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
+        Command::Submit(arguments) => {
+            let typed = matches.subcommand_matches("submit").unwrap_or(&matches);
+            all_threads().and_then(|()| submit::run(&arguments, typed))
+        }
+        Command::Bundle(arguments) => all_threads().and_then(|()| bundle::run(&arguments)),
         #[cfg(feature = "bench")]
         Command::Bench(arguments) => bench::run(*arguments),
         Command::Cartoon(arguments) => all_threads().and_then(|()| cartoon::run(&arguments)),
