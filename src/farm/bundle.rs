@@ -1,14 +1,15 @@
 //! A scene with all files that it names, in one folder or one zip file, by relative paths.
 
 use std::fs::File;
-use std::io::{self, Seek, Write};
+use std::io::{self, Write};
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 
+use flate2::Compression;
+use flate2::write::DeflateEncoder;
+use rawzip::{CompressionMethod, ZipArchiveWriter};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, ZipWriter};
 
 use super::FarmError;
 use crate::decode::{MAX_TEXT_BYTES, read_file, split_layer};
@@ -17,9 +18,6 @@ use crate::scene::Scene;
 
 /// Where files go that do not lie in the scene's folder.
 const OTHERS: &str = "files";
-
-/// Longer files have sizes of 64 bits in a zip file.
-const ZIP64_FROM_BYTES: u64 = u32::MAX as u64;
 
 /// Files by the names that they get, with `/` between folders.
 #[derive(Clone, Debug, Default)]
@@ -144,22 +142,26 @@ impl Bundle {
         Ok(())
     }
 
-    /// Writes a zip file: names sorted as they were added, without times, so that the same scene gives the same bytes.
+    /// Writes a zip file, the files in their order and without times, so that the same scene gives the same bytes.
     ///
     /// # Errors
     /// A file cannot be read or the zip file cannot be written.
-    pub fn write_zip(&self, out: impl Write + Seek, path: &Path) -> Result<(), FarmError> {
-        let broken = |error: zip::result::ZipError| {
+    pub fn write_zip(&self, out: impl Write, path: &Path) -> Result<(), FarmError> {
+        let broken = |error: rawzip::Error| {
             failed(path, "cannot be written")(io::Error::other(error.to_string()))
         };
-        let mut zip = ZipWriter::new(out);
+        let unwritable = failed(path, "cannot be written");
+        let mut zip = ZipArchiveWriter::new(out);
         for (name, contents) in &self.files {
-            let options = SimpleFileOptions::default()
-                .compression_method(CompressionMethod::Deflated)
-                .unix_permissions(0o644)
-                .large_file(contents.size() >= ZIP64_FROM_BYTES);
-            zip.start_file(name.as_str(), options).map_err(broken)?;
-            contents.copy_to(&mut zip, path)?;
+            let file = zip.new_file(name.as_str()).unix_permissions(0o644);
+            let file = file.compression_method(CompressionMethod::DEFLATE);
+            let (mut entry, config) = file.start().map_err(broken)?;
+            let encoder = DeflateEncoder::new(&mut entry, Compression::default());
+            let mut writer = config.wrap(encoder);
+            contents.copy_to(&mut writer, path)?;
+            let (encoder, descriptor) = writer.finish().map_err(broken)?;
+            encoder.finish().map_err(&unwritable)?;
+            entry.finish(descriptor).map_err(broken)?;
         }
         zip.finish().map_err(broken)?;
         Ok(())
@@ -167,13 +169,6 @@ impl Bundle {
 }
 
 impl Contents {
-    fn size(&self) -> u64 {
-        match self {
-            Self::File(path) => path.metadata().map_or(0, |metadata| metadata.len()),
-            Self::Text(text) => text.len() as u64,
-        }
-    }
-
     /// `to`: for messages.
     fn copy_to(&self, out: &mut impl Write, to: &Path) -> Result<(), FarmError> {
         match self {

@@ -15,7 +15,7 @@ pub(super) fn files(job: &Job) -> Vec<(&'static str, String)> {
     let tasks = format!(
         "{head}#SBATCH --array=0-{last}\n#SBATCH --requeue\n\
         # A task is a line of parts.txt. What an ended try has finished is kept.\n\
-        part=$(sed -n \"$((SLURM_ARRAY_TASK_ID + 1))p\" parts.txt)\nexec {PROGRAM} {task}\n",
+        part=$(sed -n \"$((SLURM_ARRAY_TASK_ID + 1))p\" parts.txt)\n{PROGRAM} {task}\n",
         head = head(job, "task-%a.log"),
         last = job.parts.len() - 1,
         task = shell_words(&job.task, "$part"),
