@@ -56,6 +56,9 @@ pub mod cpu;
 mod decode;
 #[doc(hidden)]
 pub mod distortion;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod farm;
 #[doc(hidden)]
 pub mod files;
 #[doc(hidden)]

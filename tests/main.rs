@@ -6,6 +6,7 @@ mod bench;
 mod blender;
 mod checking;
 mod cli;
+mod farm;
 mod faults;
 mod files;
 mod gltf;

@@ -6,11 +6,14 @@
 mod antialias;
 #[cfg(feature = "bench")]
 mod bench;
+mod bundle;
 mod cartoon;
 mod check;
 mod compare;
 mod export_blender;
 mod file_info;
+mod forwarded;
+mod frame_flags;
 mod goal_flags;
 mod info;
 mod interrupt;
@@ -30,6 +33,7 @@ mod scene_flags;
 mod sequence;
 mod sharpness;
 mod stage_device;
+mod submit;
 mod summary;
 mod terminal;
 mod threads;
@@ -41,7 +45,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::files;
 use crate::scene::Photo;
@@ -67,6 +71,8 @@ enum Command {
     #[cfg(feature = "start")]
     New(Box<new::Arguments>),
     Merge(merge::Arguments),
+    Submit(Box<submit::Arguments>),
+    Bundle(bundle::Arguments),
     #[cfg(feature = "bench")]
     Bench(Box<bench::Arguments>),
     Cartoon(cartoon::Arguments),
@@ -120,7 +126,9 @@ const MESA_NO_DEVICE_SELECTION: &str = "NODEVICE_SELECT";
 
 fn run_command() -> ExitCode {
     interrupt::survive_file_limits();
-    let arguments = Arguments::try_parse_from(words(std::env::args_os()))
+    let (arguments, matches) = Arguments::command()
+        .try_get_matches_from(words(std::env::args_os()))
+        .and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, matches)))
         .unwrap_or_else(|error| end_with_usage(error));
     // The window writes the scene that it reads.
     if !matches!(arguments.command, Command::Preview(_)) {
@@ -137,6 +145,11 @@ fn run_command() -> ExitCode {
         #[cfg(feature = "start")]
         Command::New(arguments) => new::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
+        Command::Submit(arguments) => {
+            let typed = matches.subcommand_matches("submit").unwrap_or(&matches);
+            all_threads().and_then(|()| submit::run(&arguments, typed))
+        }
+        Command::Bundle(arguments) => all_threads().and_then(|()| bundle::run(&arguments)),
         #[cfg(feature = "bench")]
         Command::Bench(arguments) => bench::run(*arguments),
         Command::Cartoon(arguments) => all_threads().and_then(|()| cartoon::run(&arguments)),
