@@ -4,6 +4,7 @@ mod architecture;
 mod backends;
 mod bench;
 mod cli;
+mod compositing;
 mod faults;
 mod files;
 mod gltf;

@@ -22,6 +22,7 @@ mod progress;
 mod render;
 mod scene_flags;
 mod sequence;
+mod shell;
 mod stage_device;
 mod summary;
 mod terminal;
@@ -38,12 +39,15 @@ use clap::{Parser, Subcommand};
 
 use crate::files;
 use crate::scene::Photo;
-use terminal::{print, say};
+use terminal::{print, say, summarize};
 
 /// Renders virtual objects into photographs as the same camera would have taken them.
 #[derive(Debug, Parser)]
 #[command(name = "mixray", version, arg_required_else_help = true)]
 struct Arguments {
+    /// Say nothing but errors: no progress, notes, warnings and summaries
+    #[arg(short, long, global = true)]
+    quiet: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -64,6 +68,8 @@ enum Command {
     MotionBlur(motion_blur::Arguments),
     Compare(compare::Arguments),
     Info(info::Arguments),
+    Completions(shell::Completions),
+    Man(shell::Manual),
 }
 
 /// How a command ended that did not fail.
@@ -109,6 +115,9 @@ fn run_command() -> ExitCode {
     interrupt::survive_file_limits();
     let arguments = Arguments::try_parse_from(words(std::env::args_os()))
         .unwrap_or_else(|error| end_with_usage(error));
+    if arguments.quiet {
+        terminal::be_quiet();
+    }
     // The window writes the scene that it reads.
     if !matches!(arguments.command, Command::Preview(_)) {
         files::guard_run();
@@ -128,6 +137,8 @@ fn run_command() -> ExitCode {
         Command::MotionBlur(arguments) => all_threads().and_then(|()| motion_blur::run(&arguments)),
         Command::Compare(arguments) => all_threads().and_then(|()| compare::run(&arguments)),
         Command::Info(arguments) => all_threads().and_then(|()| info::run(&arguments)),
+        Command::Completions(arguments) => shell::completions(&arguments),
+        Command::Man(arguments) => shell::manual(&arguments),
     };
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -7,10 +7,10 @@ use clap::{Args, ValueEnum};
 use super::picture_flags::PictureFlags;
 use super::progress::Steps;
 use super::render::say_idle;
-use super::terminal::print_aside;
+use super::terminal::summarize_aside;
 use super::values::whole_range;
-use super::{Failure, Outcome, interrupt, print, say};
-use crate::output::{check_writable, write_text};
+use super::{Failure, Outcome, interrupt, print, say, summarize};
+use crate::output::{ExrLayer, Format, check_writable_as, write_text};
 use crate::renderer::Watcher;
 use crate::scene::Overrides;
 use crate::scene::trajectory::FORMATS;
@@ -32,9 +32,16 @@ pub(super) struct Arguments {
     /// OpenCV calibration (YAML) in place of the intrinsics of trajectory and scene
     #[arg(long, value_name = "FILE")]
     intrinsics: Option<PathBuf>,
-    /// Folder for PNG files, .y4m file, or - for Y4M on standard output
+    /// Folder for pictures, pattern of their names with # for the digits of a frame's number (out.####.exr), .y4m file, or - for Y4M on
+    /// standard output
     #[arg(short, long, value_name = "PATH", required_unless_present = "check")]
     output: Option<PathBuf>,
+    /// Pictures of a folder [default: png; in a pattern its own]
+    #[arg(long, value_name = "FORMAT", value_parser = format)]
+    format: Option<Format>,
+    /// Layers of EXR frames, as those of `mixray render`
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    layers: Vec<ExrLayer>,
     /// Only the frames with these numbers, FROM to TO - 1
     #[arg(long, value_name = "FROM..TO", value_parser = whole_range)]
     range: Option<(u32, u32)>,
@@ -97,6 +104,8 @@ impl Arguments {
             trajectory: self.trajectory.clone(),
             intrinsics: self.intrinsics.clone(),
             output: self.output.clone().unwrap_or_else(|| "-".into()),
+            format: self.format,
+            layers: self.layers.clone(),
             range: self.range,
             allow_gaps: self.allow_gaps,
             pass_damaged_frames: self.damaged_frames == Damaged::Pass,
@@ -122,7 +131,7 @@ fn check(arguments: &Arguments, points: Option<&Path>) -> Result<Outcome, Failur
 fn render(arguments: &Arguments) -> Result<Outcome, Failure> {
     let options = arguments.options()?;
     if let Some(path) = &arguments.flags.stats {
-        check_writable(path)?;
+        check_writable_as(path, "json")?;
     }
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
@@ -143,8 +152,8 @@ fn render(arguments: &Arguments) -> Result<Outcome, Failure> {
     let text = stats.text(&options.output.display().to_string());
     match options.output == Path::new("-") {
         // Standard output is the film.
-        true => print_aside(&text),
-        false => print(&text)?,
+        true => summarize_aside(&text),
+        false => summarize(&text)?,
     }
     if stats.non_finite_samples > 0 {
         let message = format!(
@@ -165,6 +174,14 @@ fn tell(event: &Event<'_>) {
         Event::Note(text) => say("note", text),
         Event::Idle { saving, reason } => say_idle(saving, reason),
         Event::Plan { .. } | Event::Begins { .. } | Event::Ends { .. } => {}
+    }
+}
+
+fn format(text: &str) -> Result<Format, &'static str> {
+    match text {
+        "png" => Ok(Format::Png),
+        "exr" => Ok(Format::Exr),
+        _ => Err("expected png or exr"),
     }
 }
 

@@ -9,17 +9,20 @@ use glam::DVec3;
 use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
 use super::report::{FrameCounts, SequenceSeconds, SequenceStats};
 use super::{Event, SequenceError, SequenceOptions};
-use crate::output::PngBits;
+use crate::output::{ExrLayers, ExrPicture, Format, Metadata, PngBits};
 use crate::pack::next_anchor;
 use crate::renderer::{
-    Budget, ErrorGoal, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
+    Budget, Delivered, ErrorGoal, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions,
+    Watcher,
 };
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{
     BackendChoice, Camera, Content, ContentHash, Exposure, Lens, MotionBlurMethod, Scene,
 };
-use crate::stages::{Finished, GpuStages, finish};
-use crate::video::{FrameSink, FrameSource, Header, Matrix, Pixels, SinkPlan, Taken, VideoFrame};
+use crate::stages::{Finished, GpuStages, finish, finish_with_noise};
+use crate::video::{
+    FrameOutput, FrameSink, FrameSource, Header, Matrix, Pixels, SinkPlan, Taken, VideoFrame,
+};
 
 /// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
 const REACH_FRAMES: f64 = 1.5;
@@ -42,6 +45,14 @@ pub fn render_sequence(
     watcher: &Watcher<'_>,
     hear: &dyn Fn(&Event<'_>),
 ) -> Result<RenderedSequence, SequenceError> {
+    // A name that promises what cannot be written is told before anything is read.
+    let output = FrameOutput::of(&options.output, options.format)?;
+    if !options.layers.is_empty() && output.format() != Some(Format::Exr) {
+        return Err(SequenceError::Unfit(format!(
+            "{}: it has no layers; expected EXR frames for --layers; give --format exr, or a name like out.####.exr",
+            options.output.display()
+        )));
+    }
     let files = Files::read(options)?;
     let frames = options.frames.as_deref().ok_or_else(|| {
         SequenceError::Unfit(
@@ -74,6 +85,7 @@ pub fn render_sequence(
     });
     let mut sequence = Sequence {
         options,
+        output: &output,
         files: &files,
         views: &views,
         rate,
@@ -120,7 +132,11 @@ pub fn render_sequence(
         }
         hear(&Event::Ends { label, number });
     };
-    sequence.end(complete)
+    let rendered = sequence.end(complete)?;
+    if complete && options.range.is_some() {
+        source.drain(&|| watcher.is_cancelled());
+    }
+    Ok(rendered)
 }
 
 /// The first and the last frame's number, where they are known: the focus is pulled between them.
@@ -134,6 +150,7 @@ fn span(options: &SequenceOptions, source: &FrameSource) -> Option<(u32, u32)> {
 
 struct Sequence<'a> {
     options: &'a SequenceOptions,
+    output: &'a FrameOutput,
     files: &'a Files,
     views: &'a Views<'a>,
     /// Frames a second, where known.
@@ -154,6 +171,8 @@ struct Sequence<'a> {
 /// What the first frame brings to life.
 struct Started {
     sink: FrameSink,
+    /// Without the photographs.
+    scene_hash: String,
     size: (u32, u32),
     /// Frames are turned as their tags say.
     upright: bool,
@@ -247,7 +266,10 @@ impl Sequence<'_> {
             // Fitted once, to the first posed frame of the range, whether or not that one is finished.
             scene.photo = Some(frame.photo.clone());
             scene.camera = camera.clone();
+            let layers = started.sink.layers();
             let with = RendererOptions {
+                guides: layers.is_some_and(ExrLayers::need_guides),
+                real_everywhere: layers.is_some_and(ExrLayers::need_real_everywhere),
                 without: self.options.without,
                 filter: self.options.filter,
                 ..RendererOptions::default()
@@ -297,18 +319,19 @@ impl Sequence<'_> {
             return Ok(false);
         }
         let begin = Instant::now();
-        let picture = renderer.delivered().picture;
+        let Delivered { picture, film, .. } = renderer.delivered();
         self.seconds.composite += begin.elapsed().as_secs_f64();
         let copies = (renderer.scene().stages.motion_blur)
             .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);
         let motion = previous
             .filter(|_| copies)
             .map(|previous| renderer.picture_motion(&previous));
-        let Finished {
-            picture,
-            notes,
-            seconds,
-        } = finish(
+        let layers = started.sink.layers().cloned();
+        let finish = match layers.as_ref().is_some_and(ExrLayers::need_noise) {
+            true => finish_with_noise,
+            false => finish,
+        };
+        let finished = finish(
             picture,
             renderer.film(),
             renderer.scene(),
@@ -316,6 +339,17 @@ impl Sequence<'_> {
             motion.as_ref(),
             started.gpu.as_ref(),
         );
+        let exr = layers.map(|layers| {
+            let metadata = Metadata::of(renderer, started.scene_hash.clone());
+            ExrPicture::of(renderer, metadata, &film, finished.clone(), &layers)
+        });
+        drop(film);
+        let Finished {
+            picture,
+            notes,
+            seconds,
+            ..
+        } = finished;
         self.seconds.stages.add(&seconds);
         self.frames.rendered += 1;
         self.frames.moving += u32::from(renderer.is_moving());
@@ -330,7 +364,10 @@ impl Sequence<'_> {
             }
         }
         let begin = Instant::now();
-        started.sink.write(name, &picture, &frame)?;
+        match &exr {
+            Some(exr) => started.sink.write_exr(name, exr)?,
+            None => started.sink.write(name, &picture, &frame)?,
+        }
         self.seconds.write += begin.elapsed().as_secs_f64();
         self.rays = renderer.rays();
         Ok(true)
@@ -396,8 +433,12 @@ impl Sequence<'_> {
         let options = self.options;
         let mut header = header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate));
         header.matrix = options.matrix.unwrap_or(header.matrix);
+        let layers = ExrLayers::new(&options.layers);
         let sink = FrameSink::open(SinkPlan {
             path: &options.output,
+            output: self.output.clone(),
+            layers,
+            composite: scene.settings.composite,
             fingerprint: self.fingerprint(&scene),
             header,
             png_bits: options.png_bits,
@@ -406,6 +447,7 @@ impl Sequence<'_> {
         })?;
         Ok(Started {
             sink,
+            scene_hash: scene.fingerprint(),
             size,
             lens: scene.lens,
             upright: scene.settings.upright_photo,
@@ -430,7 +472,7 @@ impl Sequence<'_> {
         let png_bits = (options.png_bits).map(|bits| bits == PngBits::Sixteen);
         // What is fitted or pulled over the frames depends on which there are; a file tells by their order which it holds.
         let fits = settings.exposure == Exposure::Auto;
-        let is_file = options.output.extension().is_some_and(|e| e == "y4m");
+        let is_file = matches!(self.output, FrameOutput::Y4m(_));
         let scope = (fits || options.focus_pull_m.is_some() || is_file)
             .then_some((options.range, self.span));
         let mut hash = ContentHash::default();
@@ -441,6 +483,9 @@ impl Sequence<'_> {
         (&poses.entries, (poses.intrinsics, self.files.intrinsics)).add_to(&mut hash);
         (self.rate, (options.focus_pull_m, scope)).add_to(&mut hash);
         options.matrix.map(Matrix::name).add_to(&mut hash);
+        if self.output.format() == Some(Format::Exr) {
+            format!("{:?}", ExrLayers::new(&options.layers)).add_to(&mut hash);
+        }
         self.views.folder_of(&self.names).add_to(&mut hash);
         hash.finish()
     }
