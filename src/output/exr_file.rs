@@ -3,13 +3,12 @@
 use std::collections::HashMap;
 use std::io::Cursor;
 
-use exr::prelude::{
-    AnyChannels, Encoding, Image, Layer, LayerAttributes, SmallVec, Text, WritableImage,
-};
+use exr::prelude::{AnyChannels, Encoding, Image, Layer, LayerAttributes, Text, WritableImage};
 use exr::prelude::{Vec2, attribute::AttributeValue, attribute::Chromaticities};
 
 use super::channels::{Channels, Precision, push_channel, push_three};
 use super::exr_header::{seal, sort_attributes, unsealed};
+use super::exr_text::text_value;
 use super::{ExrPicture, Metadata, OutputError, Target, write_bytes};
 
 /// ITU-R BT.709 primaries and D65.
@@ -84,15 +83,6 @@ pub(super) fn write_layers<'a>(
         .unwrap_or_default();
     attributes.extend(texts.map(|(name, text)| (Text::from(name), text_value(text))));
     write_channels(target, picture.width, picture.height, channels, attributes)
-}
-
-/// As OpenEXR wants it; the crate's own conversion knows Latin-1 alone and panics beyond.
-fn utf8(text: &str) -> Text {
-    Text::from_bytes_unchecked(SmallVec::from_slice(text.as_bytes()))
-}
-
-pub(super) fn text_value(text: &str) -> AttributeValue {
-    AttributeValue::Text(utf8(text))
 }
 
 /// Writes a file of one part.

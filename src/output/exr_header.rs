@@ -8,7 +8,7 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use exr::prelude::Text;
 use exr::prelude::attribute::AttributeValue;
 
-use super::exr_file::text_value;
+use super::exr_text::text_value;
 
 /// Magic number and version.
 const BEFORE_HEADER_BYTES: u64 = 8;

@@ -1,7 +1,7 @@
 //! What an EXR file of a render holds.
 
 use super::channels::is_half;
-use super::{ExrLayers, Metadata};
+use super::{ExrLayer, ExrLayers, Metadata};
 use crate::film::{Film, Parts, Picture, Planes, planes};
 use crate::renderer::Renderer;
 use crate::scene::{Composite, EncodedPhoto, Photo};
@@ -50,7 +50,7 @@ impl ExrPicture {
         }
         exr.noise = finished.noise;
         exr.keeps_photo = scene.photo.as_ref().is_some_and(is_fine);
-        layers.pick(&mut exr);
+        exr.pick(layers);
         exr
     }
 
@@ -69,8 +69,48 @@ impl ExrPicture {
             metadata: None,
             keeps_photo: is_fine(photo),
         };
-        layers.pick(&mut exr);
+        exr.pick(layers);
         exr
+    }
+
+    /// Empties what is not among these, so that it is left out.
+    fn pick(&mut self, layers: &ExrLayers) {
+        let ExrPicture {
+            picture,
+            planes,
+            parts,
+            noise,
+            ..
+        } = self;
+        let colours = [
+            (ExrLayer::Virtual, &mut parts.virtual_light),
+            (ExrLayer::Change, &mut parts.change),
+            (ExrLayer::Ratio, &mut parts.ratio),
+            (ExrLayer::Noise, noise),
+            (ExrLayer::Composite, &mut picture.linear),
+            (ExrLayer::Mixed, &mut planes.mixed),
+            (ExrLayer::Real, &mut planes.real),
+            (ExrLayer::Difference, &mut planes.difference),
+            (ExrLayer::Albedo, &mut planes.albedo),
+            (ExrLayer::Variance, &mut planes.variance),
+            (ExrLayer::Normal, &mut planes.normal),
+        ];
+        for (layer, values) in colours {
+            if !layers.has(layer) {
+                values.clear();
+            }
+        }
+        let numbers = [
+            (ExrLayer::Virtual, &mut parts.coverage),
+            (ExrLayer::Mask, &mut planes.mask),
+            (ExrLayer::Depth, &mut planes.depth),
+            (ExrLayer::Samples, &mut planes.samples),
+        ];
+        for (layer, values) in numbers {
+            if !layers.has(layer) {
+                values.clear();
+            }
+        }
     }
 }
 

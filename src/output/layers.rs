@@ -1,7 +1,5 @@
 //! Which planes a picture is written with.
 
-use super::ExrPicture;
-
 /// A layer of an EXR file; the composite has no name there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExrLayer {
@@ -107,47 +105,7 @@ impl ExrLayers {
         self.has(ExrLayer::Noise)
     }
 
-    fn has(&self, layer: ExrLayer) -> bool {
+    pub(super) fn has(&self, layer: ExrLayer) -> bool {
         self.0.contains(&layer)
-    }
-
-    /// Empties what is not among them, so that it is left out.
-    pub(super) fn pick(&self, exr: &mut ExrPicture) {
-        let ExrPicture {
-            picture,
-            planes,
-            parts,
-            noise,
-            ..
-        } = exr;
-        let colours = [
-            (ExrLayer::Virtual, &mut parts.virtual_light),
-            (ExrLayer::Change, &mut parts.change),
-            (ExrLayer::Ratio, &mut parts.ratio),
-            (ExrLayer::Noise, noise),
-            (ExrLayer::Composite, &mut picture.linear),
-            (ExrLayer::Mixed, &mut planes.mixed),
-            (ExrLayer::Real, &mut planes.real),
-            (ExrLayer::Difference, &mut planes.difference),
-            (ExrLayer::Albedo, &mut planes.albedo),
-            (ExrLayer::Variance, &mut planes.variance),
-            (ExrLayer::Normal, &mut planes.normal),
-        ];
-        for (layer, values) in colours {
-            if !self.has(layer) {
-                values.clear();
-            }
-        }
-        let numbers = [
-            (ExrLayer::Virtual, &mut parts.coverage),
-            (ExrLayer::Mask, &mut planes.mask),
-            (ExrLayer::Depth, &mut planes.depth),
-            (ExrLayer::Samples, &mut planes.samples),
-        ];
-        for (layer, values) in numbers {
-            if !self.has(layer) {
-                values.clear();
-            }
-        }
     }
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use exr::prelude::Text;
 use exr::prelude::attribute::AttributeValue;
 
-use super::exr_file::text_value;
+use super::exr_text::text_value;
 use crate::distortion::LENS_FISHEYE;
 use crate::renderer::Renderer;
 use crate::scene::{

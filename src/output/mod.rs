@@ -4,6 +4,7 @@ mod channels;
 mod exr_file;
 mod exr_header;
 mod exr_picture;
+mod exr_text;
 mod extension;
 mod film_file;
 mod film_note;

@@ -1,7 +1,8 @@
 //! A converged picture with its standard error, for benchmarks.
 
 use super::channels::{Channels, Precision, push_channel, push_three};
-use super::exr_file::{text_value, write_channels};
+use super::exr_file::write_channels;
+use super::exr_text::text_value;
 use super::{OutputError, Target};
 use crate::film::Picture;
 use exr::prelude::Text;

@@ -62,7 +62,7 @@ impl FrameOutput {
                 None => Ok(Self::Y4m(final_target(path))),
             };
         }
-        if !name.contains('#') {
+        if !name.contains('#') || path.is_dir() {
             check_folder_name(path, EXPECTED)?;
             return Ok(Self::Pictures(Pictures {
                 folder: final_target(path),
