@@ -83,6 +83,7 @@ pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
 }
 
 /// [`check_writable`] of a file of one kind, whose name ends in `extension` if it has an end.
+#[cfg(feature = "cli")]
 pub(crate) fn check_writable_as(path: &Path, extension: &'static str) -> Result<(), OutputError> {
     check_writable(path)?;
     extension_among(path, &[extension])?;
