@@ -1,17 +1,12 @@
-//! Is the stated error honest, and what is adaptive sampling worth? On the CPU.
+//! Is the stated error honest? On the CPU.
 //!
-//!     cargo bench --bench adaptive             (both tables into docs/adaptive.md)
-//!     cargo bench --bench adaptive -- honest   (or `worth`: one of them)
+//!     cargo bench --bench adaptive             (a table into docs/adaptive.md)
 //!
-//! `honest` renders small scenes to an error with 200 seeds each and takes the variance of z = (estimate - reference) / stated error, pooled over
-//! the values whose stated error is not 0; the reference is a render of its own by rays per pixel, evenly sampled. `worth` times the processor of one thread.
-
-#[path = "support/cpu_time.rs"]
-mod cpu_time;
+//! Renders small scenes to an error with 200 seeds each and takes the variance of z = (estimate - reference) / stated error, pooled over
+//! the values whose stated error is not 0; the reference is a render of its own by rays per pixel, evenly sampled.
 
 use std::path::{Path, PathBuf};
 
-use cpu_time::thread_cpu_secs;
 use mixray::bench::{replace_section, shrink};
 use mixray::film::{Picture, planes};
 use mixray::renderer::{Budget, ErrorGoal, Renderer, RendererOptions, Skip, Stated, Watcher};
@@ -24,34 +19,20 @@ const SCENES: [&str; 3] = ["room", "far", "sunny"];
 const SEEDS: u32 = 200;
 /// Divides the scenes' size where 200 seeds are rendered.
 const SMALL: u32 = 10;
-/// Of each scene, for `honest`.
+/// Of each scene.
 const GOALS: [&[f64]; SCENES.len()] = [&[0.02, 0.006], &[0.02, 0.006], &[0.05]];
 const REFERENCE_RAYS: u32 = 1 << 15;
 const REFERENCE_SEED: u32 = 1_000_003;
-/// Of the scenes at half size, for `worth`.
-const WORTH_REFERENCE_RAYS: u32 = 1024;
-const WORTH_GOALS: [f64; 2] = [0.012, 0.006];
-const EVEN_RAYS: [u32; 3] = [16, 64, 256];
-const WORTH_SEEDS: u32 = 1;
 
 fn main() -> Result<(), Failure> {
-    let wanted: Vec<String> = std::env::args()
-        .skip(1)
-        .filter(|a| !a.starts_with("--"))
-        .collect();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let page = root.join("docs/adaptive.md");
-    for (name, table) in [("honest", honest as fn(&Path) -> _), ("worth", worth)] {
-        if !wanted.is_empty() && !wanted.iter().any(|w| w == name) {
-            continue;
-        }
-        let table: String = table(root)?;
-        println!("{table}");
-        let text = std::fs::read_to_string(&page)?;
-        let text =
-            replace_section(&text, name, &table).ok_or("docs/adaptive.md lacks a section")?;
-        std::fs::write(&page, text)?;
-    }
+    let table = honest(root)?;
+    println!("{table}");
+    let text = std::fs::read_to_string(&page)?;
+    let text =
+        replace_section(&text, "honest", &table).ok_or("docs/adaptive.md lacks a section")?;
+    std::fs::write(&page, text)?;
     Ok(())
 }
 
@@ -200,117 +181,4 @@ fn mean_squared(picture: &Picture, reference: &Picture) -> f64 {
     let pairs = pairs.zip(reference.linear.as_flattened());
     let sum: f64 = pairs.map(|(x, y)| f64::from(x - y).powi(2)).sum();
     sum / (3 * picture.linear.len()) as f64
-}
-
-/// Of the tiles of 16 pixels, the mean squared error of the one that 5% exceed.
-fn worst_tiles(picture: &Picture, reference: &Picture) -> f64 {
-    let (width, height) = (picture.width as usize, picture.height as usize);
-    let across = width.div_ceil(16);
-    let mut tiles = vec![(0.0, 0.0); across * height.div_ceil(16)];
-    for (i, (x, y)) in picture.linear.iter().zip(&reference.linear).enumerate() {
-        let tile = &mut tiles[i / width / 16 * across + i % width / 16];
-        tile.0 += (0..3).map(|c| f64::from(x[c] - y[c]).powi(2)).sum::<f64>();
-        tile.1 += 3.0;
-    }
-    let mut errors: Vec<f64> = tiles.iter().map(|(sum, n)| sum / n).collect();
-    errors.sort_unstable_by(f64::total_cmp);
-    errors[errors.len() * 95 / 100]
-}
-
-/// One way to render at one setting: processor seconds, squared error of the picture and of its bad tiles.
-#[derive(Clone, Copy, Default)]
-struct Point {
-    secs: f64,
-    picture: f64,
-    tiles: f64,
-}
-
-fn worth(root: &Path) -> Result<String, Failure> {
-    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let mut table = String::from(
-        "| scene | goal | RMSE | 95th of 100 tiles | CPU s | time of even sampling, equal RMSE | equal bad tiles | time of the plan, equal RMSE | equal bad tiles |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
-    );
-    for name in SCENES {
-        let mut scene = shrink(mixray::scene::load(&scene_file(root, name))?, 2);
-        scene.settings.backend = BackendChoice::Cpu;
-        let reference = by_rays(
-            &scene,
-            WORTH_REFERENCE_RAYS,
-            REFERENCE_SEED,
-            RendererOptions::default(),
-        )?
-        .picture();
-        table += &one_thread.install(|| worth_of(name, &scene, &reference))?;
-        eprintln!("{table}");
-    }
-    Ok(table)
-}
-
-fn worth_of(name: &str, scene: &Scene, reference: &Picture) -> Result<String, Failure> {
-    let even = RendererOptions {
-        without: [Skip::Plan].into_iter().collect(),
-        ..RendererOptions::default()
-    };
-    let mut adaptive = [Point::default(); WORTH_GOALS.len()];
-    let mut others = [[Point::default(); EVEN_RAYS.len()]; 2];
-    for seed in 0..WORTH_SEEDS {
-        let mut scene = scene.clone();
-        scene.settings.seed = seed;
-        for (point, goal) in adaptive.iter_mut().zip(WORTH_GOALS) {
-            add(point, reference, || to_error(&scene, goal))?;
-        }
-        for (points, options) in others.iter_mut().zip([even, RendererOptions::default()]) {
-            for (point, rays) in points.iter_mut().zip(EVEN_RAYS) {
-                add(point, reference, || by_rays(&scene, rays, seed, options))?;
-            }
-        }
-    }
-    let mut rows = String::new();
-    for (point, goal) in adaptive.iter().zip(WORTH_GOALS) {
-        let n = f64::from(WORTH_SEEDS);
-        let ratio = |points: &[Point], pick: fn(&Point) -> f64| {
-            format!(
-                "{:.2} times",
-                secs_at(points, pick, pick(point)) / point.secs
-            )
-        };
-        rows += &format!(
-            "| {name} | {goal} | {:.2e} | {:.2e} | {:.2} | {} | {} | {} | {} |\n",
-            (point.picture / n).sqrt(),
-            (point.tiles / n).sqrt(),
-            point.secs / n,
-            ratio(&others[0], |p| p.picture),
-            ratio(&others[0], |p| p.tiles),
-            ratio(&others[1], |p| p.picture),
-            ratio(&others[1], |p| p.tiles),
-        );
-    }
-    Ok(rows)
-}
-
-/// Everything from the scene in memory to the film is timed.
-fn add(
-    point: &mut Point,
-    reference: &Picture,
-    render: impl FnOnce() -> Result<Renderer, Failure>,
-) -> Result<(), Failure> {
-    let start = thread_cpu_secs();
-    let renderer = render()?;
-    point.secs += thread_cpu_secs() - start;
-    let picture = renderer.picture();
-    point.picture += mean_squared(&picture, reference);
-    point.tiles += worst_tiles(&picture, reference);
-    Ok(())
-}
-
-/// Time at which the least-squares line through the points, in log error over log time, reaches `error`.
-fn secs_at(points: &[Point], pick: fn(&Point) -> f64, error: f64) -> f64 {
-    let n = points.len() as f64;
-    let x: Vec<f64> = points.iter().map(|p| pick(p).ln()).collect();
-    let y: Vec<f64> = points.iter().map(|p| p.secs.ln()).collect();
-    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
-    let sxy: f64 = x.iter().zip(&y).map(|(x, y)| (x - mx) * (y - my)).sum();
-    let sxx: f64 = x.iter().map(|x| (x - mx) * (x - mx)).sum();
-    (my + sxy / sxx * (error.ln() - mx)).exp()
 }

@@ -109,7 +109,9 @@ pub use film::{Film, MergeError, Picture, Planes, composite};
 #[doc(inline)]
 pub use gpu::GpuError;
 #[doc(inline)]
-pub use output::{Format, Metadata, OutputError, PngBits, Target, write_exr, write_png};
+pub use output::{
+    ExrPicture, Format, Metadata, OutputError, PngBits, Target, write_exr, write_png,
+};
 #[doc(inline)]
 pub use refusal::Refusal;
 #[doc(inline)]

@@ -150,6 +150,51 @@ fn unwritable_outputs_are_refused_before_any_work() {
     folder.refuse("render absent.toml -o a.png", "absent.toml");
 }
 
+/// Nothing but errors is heard, and what was asked for.
+#[test]
+fn quiet_commands_say_nothing() {
+    let folder = Folder::with_scene(CAMERA);
+    let line = "render scene.toml --backend cpu --rpp 1 -o a.png";
+    let loud = folder.run(line);
+    assert!(!loud.stdout.is_empty(), "control");
+    for quiet in [format!("{line} --quiet"), format!("-q {line}")] {
+        let output = folder.run(&quiet);
+        assert!(output.status.success());
+        assert!(
+            output.stdout.is_empty() && output.stderr.is_empty(),
+            "{quiet}"
+        );
+    }
+    assert!(
+        folder
+            .succeed("compare a.png a.png --quiet")
+            .contains("rmse")
+    );
+    folder.refuse("render absent.toml -o a.png --quiet", "absent.toml");
+}
+
+#[test]
+fn shells_and_manuals_know_every_command() {
+    let folder = Folder::with_scene(CAMERA);
+    for (shell, part) in [
+        ("bash", "complete -F _mixray"),
+        ("zsh", "#compdef mixray"),
+        ("fish", "complete -c mixray"),
+    ] {
+        let script = folder.succeed(&format!("completions {shell}"));
+        assert!(script.contains(part), "{shell}");
+        assert!(
+            script.contains("motion-blur") && script.contains("target-error"),
+            "{shell}"
+        );
+    }
+    assert!(folder.succeed("man").starts_with(".ie"));
+    folder.succeed("man -o pages");
+    let page = folder.read("pages/mixray-noise-apply.1");
+    assert!(page.contains("premultiplied"), "{page}");
+    folder.refuse("man -o pages.txt", "expected a folder");
+}
+
 /// No output may replace a file that the scene is made of, however it is named.
 #[test]
 fn inputs_are_never_overwritten() {
@@ -164,7 +209,8 @@ fn inputs_are_never_overwritten() {
     let made_of = "would be overwritten";
     assert_refused(&render(&["-o", "photo.png"]), made_of);
     assert_refused(&render(&["-o", "./sub/../photo.png"]), made_of);
-    assert_refused(&render(&["-o", "a.png", "--stats", "scene.toml"]), made_of);
+    let stats = render(&["-o", "a.png", "--stats", "scene.toml"]);
+    assert_refused(&stats, "expected .json");
     #[cfg(unix)]
     {
         std::os::unix::fs::symlink("photo.png", folder.path("link.png")).unwrap();

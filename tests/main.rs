@@ -6,6 +6,7 @@ mod bench;
 mod blender;
 mod checking;
 mod cli;
+mod compositing;
 mod farm;
 mod faults;
 mod files;

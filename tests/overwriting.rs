@@ -353,10 +353,14 @@ fn the_file_behind_standard_input_is_an_input() {
         command
     };
     let common = "sequence scene.toml --frames - --trajectory poses.json";
-    for rest in ["-o film.y4m --overwrite", "-o out --stats film.y4m"] {
+    std::fs::hard_link(folder.path("film.y4m"), folder.path("film.json")).unwrap();
+    for (rest, output) in [
+        ("-o film.y4m --overwrite", "film.y4m"),
+        ("-o out --stats film.json", "film.json"),
+    ] {
         folder.refused(
             &mut from_film(&format!("{common} {rest}")),
-            "film.y4m",
+            output,
             "standard input",
         );
     }
@@ -420,8 +424,8 @@ fn two_outputs_are_never_one_file() {
         ("render scene.toml -o new.png --stats new.png".to_owned(), "new.png"),
         ("cartoon photo.png new.png --edges new.png".to_owned(), "new.png"),
         ("noise calibrate in -o new.toml --report new.toml".to_owned(), "new.toml"),
-        ("sequence scene.toml --frames in --trajectory poses.json -o out --stats out/f_0001.png".to_owned(), "f_0001.png"),
-        ("sequence scene.toml --frames in --trajectory poses.json -o new.y4m --stats new.y4m.part".to_owned(), "new.y4m.part"),
+        ("sequence scene.toml --frames in --trajectory poses.json -o out --stats out/mixray-sequence.json".to_owned(), "mixray-sequence.json"),
+        ("sequence scene.toml --frames in --trajectory poses.json -o new.y4m --stats new.y4m.mixray-sequence.json".to_owned(), "new.y4m.mixray-sequence.json"),
     ];
     std::fs::create_dir(folder.path("out")).unwrap();
     #[cfg(unix)]

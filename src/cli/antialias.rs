@@ -7,7 +7,7 @@ use clap::Args;
 use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
 use super::values::unit;
-use super::{Failure, Outcome, print, say};
+use super::{Failure, Outcome, say, summarize};
 use crate::output::{Target, write_composite};
 use crate::scene::AntialiasSettings;
 use crate::stages::antialias::antialias;
@@ -43,6 +43,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         say("note", "the mask is soft already: nothing is blended");
     }
     write_composite(&target, &layers.picture, &layers.photo, layers.bits())?;
-    print(&format!("picture {}\n", target.path().display()))?;
+    summarize(&format!("picture {}\n", target.path().display()))?;
     Ok(Outcome::Done)
 }

@@ -8,7 +8,7 @@ use clap::builder::PossibleValuesParser;
 
 use super::stage_device::StageDevice;
 use super::values::{unit, within};
-use super::{Failure, Outcome, print, read_photo};
+use super::{Failure, Outcome, read_photo, summarize};
 use crate::output::{PngBits, Target, write_image};
 use crate::scene::{CartoonSettings, CartoonStyle, Choice};
 use crate::stages::EncodedImage;
@@ -139,7 +139,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     if let (Some(target), Some(edges)) = (&edges_target, &result.edges) {
         write_image(target, &side_by_side(edges).to_picture(), PngBits::Eight)?;
     }
-    print(&format!(
+    summarize(&format!(
         "picture {} ({} x {}, {} style)\ntime    {:.1} ms for the cartoon\n",
         target.path().display(),
         image.width,

@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use super::Failure;
 use super::picture_flags::PictureFlags;
 use super::values::whole_range;
+use crate::output::{ExrLayer, Format};
 use crate::scene::Overrides;
 use crate::sequence::SequenceOptions;
 use crate::video::Matrix;
@@ -19,6 +20,12 @@ pub(super) struct FrameFlags {
     /// OpenCV calibration (YAML) in place of the intrinsics of trajectory and scene
     #[arg(long, value_name = "FILE")]
     pub intrinsics: Option<PathBuf>,
+    /// Pictures of a folder [default: png; in a pattern its own]
+    #[arg(long, value_name = "FORMAT", value_parser = format)]
+    format: Option<Format>,
+    /// Layers of EXR frames, as those of `mixray render`
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    layers: Vec<ExrLayer>,
     /// Only the frames with these numbers, FROM to TO - 1
     #[arg(long, value_name = "FROM..TO", value_parser = whole_range)]
     pub range: Option<(u32, u32)>,
@@ -69,6 +76,8 @@ impl FrameFlags {
             trajectory,
             intrinsics: self.intrinsics.clone(),
             output,
+            format: self.format,
+            layers: self.layers.clone(),
             range: self.range,
             part: None,
             allow_gaps: self.allow_gaps,
@@ -80,6 +89,14 @@ impl FrameFlags {
             png_bits: flags.png_bits,
             sandbox: flags.scene.sandbox,
         })
+    }
+}
+
+fn format(text: &str) -> Result<Format, &'static str> {
+    match text {
+        "png" => Ok(Format::Png),
+        "exr" => Ok(Format::Exr),
+        _ => Err("expected png or exr"),
     }
 }
 

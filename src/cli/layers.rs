@@ -4,21 +4,31 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{Failure, read_photo};
+use super::{Failure, read_photo, say};
 use crate::film::Picture;
 use crate::output::{ChannelFile, PngBits};
-use crate::scene::{Photo, read_coverage};
+use crate::refusal::Refusal;
+use crate::scene::{LayerPicture, Photo, read_coverage, read_layer};
 
 #[derive(Debug, Args)]
 pub(super) struct LayerArguments {
     /// The photograph
     photo: PathBuf,
-    /// The virtual things, not premultiplied, of the photograph's size; pixels outside the mask are not read
+    /// The virtual things, of the photograph's size, with alpha or with MASK; a layer of an OpenEXR file: a.exr#layer. PNG colours are
+    /// straight, EXR colours beside an alpha premultiplied, unless --straight or --premultiplied says otherwise; pixels outside the mask
+    /// are not read
     layer: PathBuf,
     /// Grey picture: how much of each pixel is virtual, black 0, white 1; its alpha where it has one; of an EXR file the channel mask.Y, A, Y or R
-    mask: PathBuf,
-    /// MASK is a depth picture: what is nearer than the far limit is virtual; of an EXR file the channel depth.Z, Depth.Z, Z, Y or R
+    /// [default: LAYER's alpha]
+    mask: Option<PathBuf>,
+    /// LAYER's colours are times its alpha, or MASK if it has none
+    #[arg(long, conflicts_with = "straight")]
+    premultiplied: bool,
+    /// LAYER's colours are not times its alpha
     #[arg(long)]
+    straight: bool,
+    /// MASK is a depth picture: what is nearer than the far limit is virtual; of an EXR file the channel depth.Z, Depth.Z, Z, Y or R
+    #[arg(long, requires = "mask")]
     depth: bool,
     /// The far limit: white is 1, EXR values are as stored
     #[arg(long, value_name = "X", default_value_t = 1.0, requires = "depth", value_parser = distance, allow_hyphen_values = true)]
@@ -36,27 +46,45 @@ fn distance(text: &str) -> Result<f32, &'static str> {
 pub(super) struct Layers {
     pub photo: Photo,
     pub mask: Vec<f32>,
+    /// The layer's colour times the mask.
+    light: Vec<[f32; 3]>,
     pub picture: Picture,
 }
 
 impl LayerArguments {
     pub(super) fn read(&self) -> Result<Layers, Failure> {
         let photo = read_photo(&self.photo)?;
-        let layer = read_photo(&self.layer)?;
-        let mask = self.read_mask()?;
+        let (layer, warnings) = read_layer(&self.layer)
+            .map_err(|problem| Failure(format!("{}: {problem}", self.layer.display())))?;
+        for warning in warnings {
+            say("warning", &format!("{}: {warning}", self.layer.display()));
+        }
         self.check_size(&photo, (layer.width, layer.height), &self.layer)?;
-        self.check_size(&photo, (mask.width, mask.height), &self.mask)?;
-        let mask = self.coverage(mask.values);
+        let mask = match &self.mask {
+            Some(path) => {
+                let mask = self.read_mask(path)?;
+                self.check_size(&photo, (mask.width, mask.height), path)?;
+                self.coverage(mask.values)
+            }
+            None if layer.alpha.is_empty() => {
+                return Err(Failure(format!(
+                    "{}: it has no alpha that tells what is virtual in it; expected a picture with alpha, or a MASK after it; give one",
+                    self.layer.display()
+                )));
+            }
+            None => self.coverage(layer.alpha.clone()),
+        };
+        let light = self.light(&layer, &mask);
         let linear = photo
             .linear
             .iter()
-            .zip(&layer.linear)
+            .zip(&light)
             .zip(&mask)
-            .map(|((photo, layer), m)| {
-                if *m == 0.0 {
+            .map(|((photo, light), m)| {
+                if *m == 0.0 && *light == [0.0; 3] {
                     *photo
                 } else {
-                    std::array::from_fn(|c| m * layer[c] + (1.0 - m) * photo[c])
+                    std::array::from_fn(|c| light[c] + (1.0 - m) * photo[c])
                 }
             })
             .collect();
@@ -68,8 +96,31 @@ impl LayerArguments {
         Ok(Layers {
             photo,
             mask,
+            light,
             picture,
         })
+    }
+
+    /// The layer's colours times the mask.
+    fn light(&self, layer: &LayerPicture, mask: &[f32]) -> Vec<[f32; 3]> {
+        let is_premultiplied = self.premultiplied || (layer.is_premultiplied && !self.straight);
+        let own_alpha = |pixel: usize| layer.alpha.get(pixel).copied();
+        let pixels = layer.linear.iter().zip(mask).enumerate();
+        pixels
+            .map(|(pixel, (colour, m))| {
+                let times = match (is_premultiplied, &self.mask, own_alpha(pixel)) {
+                    (false, ..) => *m,
+                    // What is as bright as it is and covers nothing is added.
+                    (true, None, _) | (true, _, None) => 1.0,
+                    (true, Some(_), Some(alpha)) if alpha > 0.0 => m / alpha,
+                    (true, Some(_), Some(_)) => 0.0,
+                };
+                match times == 0.0 {
+                    true => [0.0; 3],
+                    false => colour.map(|c| times * c),
+                }
+            })
+            .collect()
     }
 
     fn check_size(&self, photo: &Photo, size: (u32, u32), path: &Path) -> Result<(), Failure> {
@@ -88,16 +139,24 @@ impl LayerArguments {
     }
 
     /// The mask or depth as stored, no curve.
-    fn read_mask(&self) -> Result<Plane, Failure> {
-        if self
-            .mask
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("exr"))
-        {
-            return self.read_channel();
+    fn read_mask(&self, path: &Path) -> Result<Plane, Failure> {
+        let name = path.to_string_lossy().to_ascii_lowercase();
+        if name.ends_with(".exr") {
+            return self.read_channel(path);
         }
-        let (width, height, values) = read_coverage(&self.mask)
-            .map_err(|problem| Failure(format!("{}: {problem}", self.mask.display())))?;
+        let failed = |problem: Refusal| Failure(format!("{}: {problem}", path.display()));
+        if name.contains(".exr#") && !path.exists() {
+            let (layer, _) = read_layer(path).map_err(failed)?;
+            return Ok(Plane {
+                width: layer.width,
+                height: layer.height,
+                values: match layer.alpha.is_empty() {
+                    true => layer.linear.iter().map(|[red, ..]| *red).collect(),
+                    false => layer.alpha,
+                },
+            });
+        }
+        let (width, height, values) = read_coverage(path).map_err(failed)?;
         Ok(Plane {
             width,
             height,
@@ -106,8 +165,19 @@ impl LayerArguments {
     }
 
     /// Of an OpenEXR file, which may hold much else.
-    fn read_channel(&self) -> Result<Plane, Failure> {
-        let mut file = ChannelFile::read(&self.mask)?;
+    fn read_channel(&self, path: &Path) -> Result<Plane, Failure> {
+        let mut file = ChannelFile::read(path)?;
+        if !self.depth
+            && !file.floats.contains_key("mask.Y")
+            && let Ok((layer, _)) = read_layer(path)
+            && !layer.alpha.is_empty()
+        {
+            return Ok(Plane {
+                width: layer.width,
+                height: layer.height,
+                values: layer.alpha,
+            });
+        }
         let wanted: &[&str] = match self.depth {
             true => &["depth.Z", "Depth.Z", "Z", "Y", "R"],
             false => &["mask.Y", "A", "Y", "R"],
@@ -126,14 +196,14 @@ impl LayerArguments {
         let Some(values) = found.and_then(|name| file.floats.remove(&name)) else {
             return Err(Failure(format!(
                 "{}: it has no float channel named {}; expected one of them; write it into the file",
-                self.mask.display(),
+                path.display(),
                 wanted.join(", ")
             )));
         };
         if let Some(bad) = values.iter().position(|value| value.is_nan()) {
             return Err(Failure(format!(
                 "{}: pixel ({}, {}) is NaN; expected numbers; repair the file",
-                self.mask.display(),
+                path.display(),
                 bad % file.width as usize,
                 bad / file.width as usize
             )));
@@ -167,14 +237,8 @@ struct Plane {
 impl Layers {
     /// The layer's colour times the mask, and the mask.
     pub(super) fn premultiplied(&self) -> Vec<[f32; 4]> {
-        let pixels = self.picture.linear.iter().zip(&self.photo.linear);
-        pixels
-            .zip(&self.mask)
-            .map(|((both, photo), m)| {
-                let [r, g, b] = [0, 1, 2].map(|c| both[c] - (1.0 - m) * photo[c]);
-                [r, g, b, *m]
-            })
-            .collect()
+        let pixels = self.light.iter().zip(&self.mask);
+        pixels.map(|([r, g, b], m)| [*r, *g, *b, *m]).collect()
     }
 
     pub(super) fn bits(&self) -> PngBits {

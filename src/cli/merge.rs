@@ -9,7 +9,7 @@ use super::render::write;
 use super::scene_flags::SceneFlags;
 use super::summary::combination;
 use super::values::png_bits;
-use super::{Failure, Outcome, print, say};
+use super::{Failure, Outcome, say, summarize};
 use crate::film::Film;
 use crate::output::{ExrLayers, FilmNote, PngBits, Target, read_film};
 use crate::renderer::{Progress, Renderer, Watcher};
@@ -101,7 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         );
     }
     out += &moved.map(combination).unwrap_or_default();
-    print(&out)?;
+    summarize(&out)?;
     Ok(Outcome::Done)
 }
 

@@ -32,6 +32,7 @@ mod render;
 mod scene_flags;
 mod sequence;
 mod sharpness;
+mod shell;
 mod stage_device;
 mod submit;
 mod summary;
@@ -49,12 +50,15 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::files;
 use crate::scene::Photo;
-use terminal::{print, say};
+use terminal::{print, say, summarize};
 
 /// Renders virtual objects into photographs as the same camera would have taken them.
 #[derive(Debug, Parser)]
 #[command(name = "mixray", version, arg_required_else_help = true)]
 struct Arguments {
+    /// Say nothing but errors: no progress, notes, warnings and summaries
+    #[arg(short, long, global = true)]
+    quiet: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -83,6 +87,8 @@ enum Command {
     Compare(compare::Arguments),
     ExportBlender(export_blender::Arguments),
     Info(info::Arguments),
+    Completions(shell::Completions),
+    Man(shell::Manual),
 }
 
 /// How a command ended that did not fail.
@@ -130,6 +136,9 @@ fn run_command() -> ExitCode {
         .try_get_matches_from(words(std::env::args_os()))
         .and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, matches)))
         .unwrap_or_else(|error| end_with_usage(error));
+    if arguments.quiet {
+        terminal::be_quiet();
+    }
     // The window writes the scene that it reads.
     if !matches!(arguments.command, Command::Preview(_)) {
         files::guard_run();
@@ -162,6 +171,8 @@ fn run_command() -> ExitCode {
             all_threads().and_then(|()| export_blender::run(&arguments))
         }
         Command::Info(arguments) => all_threads().and_then(|()| info::run(&arguments)),
+        Command::Completions(arguments) => shell::completions(&arguments),
+        Command::Man(arguments) => shell::manual(&arguments),
     };
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

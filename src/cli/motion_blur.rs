@@ -7,10 +7,11 @@ use clap::Args;
 use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
 use super::values::{unit, within};
-use super::{Failure, Outcome, print, say};
+use super::{Failure, Outcome, say, summarize};
+use crate::gpu::GpuError;
 use crate::output::{Target, write_composite};
 use crate::scene::MotionBlurSettings;
-use crate::stages::motion_blur::{Copies, draw_copies};
+use crate::stages::motion_blur::{Copies, draw_copies, draw_see_through, shape};
 
 /// Puts a layer over a photograph, blurred along its motion by copies (Fischer and Bartz 2006, section 5)
 #[derive(Debug, Args)]
@@ -67,15 +68,28 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     match Copies::of(arguments.vector, &settings) {
         Some(copies) => {
             let layer = layers.premultiplied();
-            let mut canvas: Vec<[f32; 4]> = (layers.photo.linear.iter())
-                .map(|[r, g, b]| [*r, *g, *b, 0.0])
-                .collect();
             let size = (layers.photo.width, layers.photo.height);
-            match arguments.device.open()? {
-                Some(gpu) => gpu.draw_copies(&mut canvas, size, &[(&layer, copies)])?,
-                None => draw_copies(&mut canvas, size, &layer, &copies),
-            }
-            layers.picture.linear = canvas.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
+            let gpu = arguments.device.open()?;
+            let draw = |canvas: &mut [[f32; 4]], layer: &[[f32; 4]]| -> Result<(), GpuError> {
+                match &gpu {
+                    Some(gpu) => gpu.draw_copies(canvas, size, &[(layer, copies)]),
+                    None => {
+                        draw_copies(canvas, size, layer, &copies);
+                        Ok(())
+                    }
+                }
+            };
+            let shape = shape(&layers.mask, size);
+            let photo = &layers.photo.linear;
+            layers.picture.linear = match shape == layers.mask {
+                true => {
+                    let mut canvas: Vec<[f32; 4]> =
+                        photo.iter().map(|[r, g, b]| [*r, *g, *b, 0.0]).collect();
+                    draw(&mut canvas, &layer)?;
+                    canvas.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect()
+                }
+                false => draw_see_through(photo, &layer, &shape, draw)?,
+            };
         }
         None => say(
             "note",
@@ -83,6 +97,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         ),
     }
     write_composite(&target, &layers.picture, &layers.photo, layers.bits())?;
-    print(&format!("picture {}\n", target.path().display()))?;
+    summarize(&format!("picture {}\n", target.path().display()))?;
     Ok(Outcome::Done)
 }

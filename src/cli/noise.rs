@@ -9,8 +9,8 @@ use clap::{Args, Subcommand};
 use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
 use super::values::within;
-use super::{Failure, Outcome, print, progress, read_photo, say};
-use crate::output::{Target, check_writable, write_composite, write_text};
+use super::{Failure, Outcome, print, progress, read_photo, say, summarize};
+use crate::output::{Target, check_writable_as, write_composite, write_text};
 use crate::scene::{Choice, NoiseFit, NoiseMethod, NoiseProfile, NoiseSettings};
 use crate::stages::calibration::{calibrate, estimate_from_one, group_frames, report_html};
 use crate::stages::noise::{NoiseInput, NoiseStage};
@@ -155,9 +155,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 }
 
 fn run_calibrate(arguments: &Calibrate) -> Result<Outcome, Failure> {
-    check_writable(&arguments.output)?;
+    check_writable_as(&arguments.output, "toml")?;
     if let Some(report) = &arguments.report {
-        check_writable(report)?;
+        check_writable_as(report, "html")?;
     }
     if let Some(fit) = arguments.from {
         if fit.variance(0.0).max(fit.variance(255.0)) <= 0.0 {
@@ -171,7 +171,7 @@ fn run_calibrate(arguments: &Calibrate) -> Result<Outcome, Failure> {
             .check()
             .map_err(|problem| Failure(format!("--from: {problem}")))?;
         write_text(&arguments.output, &profile.to_toml())?;
-        print(&summary(&profile, &arguments.output))?;
+        summarize(&summary(&profile, &arguments.output))?;
         return Ok(Outcome::Done);
     }
     let scenes = group_frames(&arguments.frames)?;
@@ -188,9 +188,9 @@ fn run_calibrate(arguments: &Calibrate) -> Result<Outcome, Failure> {
     if let Some(report) = &arguments.report {
         write_text(report, &report_html(&calibration))?;
     }
-    print(&summary(&calibration.profile, &arguments.output))?;
+    summarize(&summary(&calibration.profile, &arguments.output))?;
     if let Some(report) = &arguments.report {
-        print(&format!("report  {}\n", report.display()))?;
+        summarize(&format!("report  {}\n", report.display()))?;
     }
     Ok(Outcome::Done)
 }
@@ -275,7 +275,7 @@ fn run_apply(arguments: &Apply) -> Result<Outcome, Failure> {
     }
     let seconds = start.elapsed().as_secs_f64();
     write_composite(&target, &layers.picture, &layers.photo, layers.bits())?;
-    print(&format!(
+    summarize(&format!(
         "picture {}\ntime    {:.1} ms for the noise\n",
         target.path().display(),
         1000.0 * seconds

@@ -1,6 +1,5 @@
 //! The progress bar: on stderr, and only where that is a terminal; and lines on stdout for an engine that asks for them.
 
-use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -9,13 +8,14 @@ use clap::ValueEnum;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
 use super::pool;
-use super::terminal::{escaped, one_line, print};
+use super::terminal::{escaped, one_line, print, shows_progress};
 use crate::renderer::{Phase, Progress};
 
 /// What a render does, and the share of it that is done.
 pub(super) struct Bar {
     bar: Option<ProgressBar>,
     unit: &'static str,
+    pace: Mutex<Pace>,
     /// Rays when they were last counted, and a second's worth of them in millions until then: they are counted pass by pass.
     rate: Mutex<(u64, f64)>,
     lines: Option<Lines>,
@@ -52,13 +52,47 @@ impl Lines {
     }
 }
 
+/// The unit of renders to an error.
+pub(super) const SCRAMBLES: &str = "scrambles";
+
+/// Seconds for what was done lately: the first scrambles of a render to an error are trials, which take a fraction of what later ones take.
+#[derive(Debug, Default)]
+struct Pace {
+    phase: Option<Phase>,
+    /// Share and seconds where the step before began and ended.
+    steps: [(f64, f64); 2],
+}
+
+impl Pace {
+    /// Seconds left by the last two steps; `None` before the first.
+    fn left(&mut self, progress: &Progress) -> Option<f64> {
+        let now = progress.elapsed.as_secs_f64();
+        let total = f64::from(progress.samples_total);
+        // Of steps that were done, which stay what they are when more are wanted.
+        let done = progress.share_done * total.max(1.0);
+        if self.phase != Some(progress.phase) || done < self.steps[1].0 {
+            *self = Self {
+                phase: Some(progress.phase),
+                ..Self::default()
+            };
+        }
+        let step = (total / PARTS as f64).max(1.0).min(total.max(1.0) / 16.0);
+        if done - self.steps[1].0 >= step {
+            self.steps = [self.steps[1], (done, now)];
+        }
+        let [(from, begin), _] = self.steps;
+        let pace = (now - begin) / (done - from);
+        (done > from).then(|| pace * (total.max(1.0) - done))
+    }
+}
+
 /// Of the bar's length.
 const PARTS: u64 = 1000;
 
 impl Bar {
     /// `unit`: of what a render counts, "rays per pixel" or "scrambles".
     pub(super) fn new(doing: &'static str, unit: &'static str) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
+        let bar = shows_progress().then(|| {
             let bar = ProgressBar::new(PARTS);
             set_template(&bar, "{prefix} {wide_bar} {percent:>3}%{msg}");
             bar.set_prefix(doing);
@@ -68,6 +102,7 @@ impl Bar {
         Self {
             bar,
             unit,
+            pace: Mutex::default(),
             rate: Mutex::default(),
             lines: None,
         }
@@ -87,7 +122,6 @@ impl Bar {
         bar.set_prefix(progress.phase.name());
         bar.set_position((progress.share_done * PARTS as f64) as u64);
         let seconds = progress.elapsed.as_secs_f64().max(1e-9);
-        let left = seconds * (1.0 / progress.share_done.max(1e-9) - 1.0);
         let mut message = String::new();
         if progress.phase == Phase::Rendering {
             let (samples, total, unit) = (progress.samples, progress.samples_total, self.unit);
@@ -102,9 +136,16 @@ impl Bar {
                 message += &format!(", {:.2} Mrays/s", counted.1);
             }
         }
-        if progress.share_done > 0.0 && seconds > 1.0 {
+        let left = (self.pace.lock().ok()).and_then(|mut pace| pace.left(progress));
+        if let Some(left) = left.filter(|_| seconds > 1.0) {
             let left = HumanDuration(Duration::try_from_secs_f64(left).unwrap_or(Duration::MAX));
-            message += &format!(", {left:#} left");
+            // An error goal takes further scrambles where the first have not met it.
+            let least = if self.unit == SCRAMBLES {
+                "at least "
+            } else {
+                ""
+            };
+            message += &format!(", {least}{left:#} left");
         }
         bar.set_message(message);
     }
@@ -137,7 +178,7 @@ pub(super) struct Steps {
 
 impl Steps {
     pub(super) fn new(count: u64) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
+        let bar = shows_progress().then(|| {
             let bar = ProgressBar::new(count);
             set_template(&bar, "{bar:24} {pos}/{len}, {elapsed}: {wide_msg}");
             tick(&bar, 500);
@@ -223,7 +264,7 @@ pub(super) struct Count {
 
 impl Count {
     pub(super) fn new(what: &'static str) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
+        let bar = shows_progress().then(|| {
             let bar = ProgressBar::new(1);
             set_template(&bar, "{wide_bar} {pos}/{len} {msg}, {eta} left");
             bar.set_message(what);
@@ -243,5 +284,47 @@ impl Count {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(samples: u32, total: u32, seconds: f64) -> Progress {
+        Progress {
+            share_done: f64::from(samples) / f64::from(total),
+            elapsed: Duration::from_secs_f64(seconds),
+            samples,
+            samples_total: total,
+            ..Progress::begin(Phase::Rendering)
+        }
+    }
+
+    /// Eight trials of half a second, then scrambles of ten seconds each.
+    #[test]
+    fn the_time_left_is_told_by_the_last_steps() {
+        let mut pace = Pace::default();
+        let mut told = Vec::new();
+        let mut seconds = 0.0;
+        for samples in 0..24 {
+            told.push((seconds, pace.left(&at(samples, 24, seconds))));
+            seconds += if samples < 8 { 0.5 } else { 10.0 };
+        }
+        for (now, left) in &told[11..] {
+            let left = left.expect("told");
+            let truth = seconds - now;
+            assert!(
+                (left - truth).abs() < 0.3 * truth + 1.0,
+                "{left} of {truth}"
+            );
+        }
+        let (now, _) = told[12];
+        let by_mean = now * (24.0 / 12.0 - 1.0);
+        assert!(
+            by_mean < 0.4 * (seconds - now),
+            "control: the mean is far off"
+        );
+        assert_eq!(Pace::default().left(&at(0, 24, 3.0)), None);
     }
 }

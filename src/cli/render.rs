@@ -6,19 +6,19 @@ use std::time::Instant;
 use clap::Args;
 
 use super::picture_flags::PictureFlags;
-use super::progress::Bar;
+use super::progress::{Bar, SCRAMBLES};
 use super::values::part;
-use super::{Failure, Outcome, interrupt, print, say, summary};
+use super::{Failure, Outcome, interrupt, say, summarize, summary};
 use crate::check::{self, Extent};
 use crate::output::{
-    ExrLayer, ExrLayers, FilmNote, Format, Metadata, PngBits, Target, check_writable, read_film,
-    write_exr, write_film, write_png, write_text,
+    ExrLayer, ExrLayers, ExrPicture, FilmNote, Format, Metadata, PngBits, Target,
+    check_writable_as, read_film, write_exr, write_film, write_png, write_text,
 };
 use crate::renderer::{
     Budget, Delivered, Goal, Progress, Renderer, RendererOptions, Stats, Watcher,
 };
 use crate::scene::{MotionBlurMethod, Overrides};
-use crate::stages::{GpuStages, finish};
+use crate::stages::{GpuStages, finish, finish_with_noise};
 
 /// Renders a scene's virtual objects into its photograph
 ///
@@ -30,9 +30,9 @@ pub(super) struct Arguments {
     /// Picture to write, .png or .exr; may be given several times [default: the scene's folder name + .png]
     #[arg(short, long, value_name = "OUT")]
     output: Vec<PathBuf>,
-    /// Layers of .exr pictures, with commas between: composite, difference, mask, depth, normal, albedo, variance, samples, real, mixed.
-    /// real and mixed ask for the real light everywhere, which may cost several times the rest [default: composite, difference, mask,
-    /// depth, normal, variance, samples; with the quotient composite real too; with --range all]
+    /// Layers of .exr pictures, with commas between: composite, virtual, change, ratio, noise, mask, depth, normal, variance, samples, which
+    /// are the default, difference, albedo, real, mixed. real and mixed ask for the real light everywhere, which may cost several times the
+    /// rest [default with --range: all]
     #[arg(
         long,
         value_name = "NAME,...",
@@ -81,7 +81,7 @@ impl Arguments {
             .map(|path| Target::picture(path))
             .collect::<Result<_, _>>()?;
         if let Some(path) = &self.flags.stats {
-            check_writable(path)?;
+            check_writable_as(path, "json")?;
         }
         if self.range.is_some() && !targets.iter().any(|t| t.format() == Format::Exr) {
             let message =
@@ -115,7 +115,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     job.flags.start_threads()?;
     let start = Instant::now();
     let unit = match job.goal {
-        Some(_) => "scrambles",
+        Some(_) => SCRAMBLES,
         None => "rays per pixel",
     };
     let bar = Bar::new("reading the scene", unit).told_to(job.flags.progress);
@@ -140,7 +140,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     // A film that goes on has everything that it may be asked for.
     let layers = match job.range {
         Some(_) => ExrLayers::all(),
-        None => ExrLayers::new(&job.layers, scene.settings.composite),
+        None => ExrLayers::new(&job.layers),
     };
     let options = RendererOptions {
         guides: is_exr && layers.need_guides(),
@@ -216,7 +216,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         write_text(path, &stats.to_json())?;
     }
     let aims = goal.is_some_and(|goal| !goal.takes_all_rays());
-    print(&summary::text(&renderer, &stats, &targets, aims, moved))?;
+    summarize(&summary::text(&renderer, &stats, &targets, aims, moved))?;
     if job.range.is_some() && interrupted.is_set() {
         say("warning", "the range is not complete: it cannot be merged");
     }
@@ -257,7 +257,16 @@ pub(super) fn write(
     film_range: Option<(u32, u32)>,
 ) -> Result<Option<f64>, Failure> {
     let gpu = renderer.gpu_device().cloned().map(GpuStages::new);
-    let Delivered { picture, moved } = renderer.delivered();
+    let Delivered {
+        picture,
+        film: shown,
+        moved,
+    } = renderer.delivered();
+    let is_exr = targets.iter().any(|t| t.format() == Format::Exr);
+    let finish = match is_exr && layers.need_noise() {
+        true => finish_with_noise,
+        false => finish,
+    };
     let finished = finish(
         picture,
         renderer.film(),
@@ -277,27 +286,24 @@ pub(super) fn write(
     for note in &finished.notes {
         say("note", note);
     }
-    let picture = finished.picture;
     let photo = renderer.scene().photo.as_ref();
     for target in targets {
         match target.format() {
             Format::Png => {
                 let bits = png_bits.unwrap_or_else(|| PngBits::for_photo(photo));
-                write_png(target, &picture, photo, bits)?;
+                write_png(target, &finished.picture, photo, bits)?;
             }
             Format::Exr => {
-                let metadata = Metadata::of(renderer);
-                let planes = renderer.planes();
+                let metadata = Metadata::of(renderer, renderer.scene().fingerprint());
+                let exr = ExrPicture::of(renderer, metadata, &shown, finished.clone(), layers);
                 if let Some(range) = film_range {
                     let film = renderer.film();
                     let on_gpu = renderer.gpu_device().is_some();
                     let without = renderer.without().of_films(on_gpu);
                     let note = FilmNote::new(renderer.scene(), range, without);
-                    write_film(target, &picture, &planes, &metadata, film, &note)?;
+                    write_film(target, &exr, film, &note)?;
                 } else {
-                    let (mut picture, mut planes) = (picture.clone(), planes);
-                    layers.pick(&mut picture, &mut planes);
-                    write_exr(target, &picture, &planes, &metadata)?;
+                    write_exr(target, &exr)?;
                 }
             }
         }

@@ -8,10 +8,10 @@ use super::frame_flags::{FrameFlags, positive};
 use super::picture_flags::PictureFlags;
 use super::progress::Steps;
 use super::render::say_idle;
-use super::terminal::print_aside;
+use super::terminal::summarize_aside;
 use super::values::part;
-use super::{Failure, Outcome, interrupt, print, say};
-use crate::output::{check_writable, write_text};
+use super::{Failure, Outcome, interrupt, print, say, summarize};
+use crate::output::{check_writable_as, write_text};
 use crate::renderer::Watcher;
 use crate::scene::trajectory::FORMATS;
 use crate::sequence::{Event, RenderedSequence, SequenceOptions, check_poses, render_sequence};
@@ -25,7 +25,8 @@ pub(super) struct Arguments {
     scene: PathBuf,
     #[arg(long, value_name = "FILE", help = format!("Poses: {FORMATS}"))]
     trajectory: PathBuf,
-    /// Folder for PNG files, .y4m file, or - for Y4M on standard output
+    /// Folder for pictures, pattern of their names with # for the digits of a frame's number (out.####.exr), .y4m file, or - for Y4M on
+    /// standard output
     #[arg(short, long, value_name = "PATH", required_unless_present = "check")]
     output: Option<PathBuf>,
     /// Of the range render only these, each as the whole range has it: FROM..TO (to TO - 1), or FROM-LAST
@@ -78,7 +79,7 @@ fn check(arguments: &Arguments, points: Option<&Path>) -> Result<Outcome, Failur
 fn render(arguments: &Arguments) -> Result<Outcome, Failure> {
     let options = arguments.options()?;
     if let Some(path) = &arguments.flags.stats {
-        check_writable(path)?;
+        check_writable_as(path, "json")?;
     }
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
@@ -105,8 +106,8 @@ fn render(arguments: &Arguments) -> Result<Outcome, Failure> {
     let text = stats.text(&options.output.display().to_string());
     match options.output == Path::new("-") {
         // Standard output is the film.
-        true => print_aside(&text),
-        false => print(&text)?,
+        true => summarize_aside(&text),
+        false => summarize(&text)?,
     }
     if stats.non_finite_samples > 0 {
         let message = format!(

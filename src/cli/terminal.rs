@@ -1,7 +1,8 @@
 //! What reaches the terminal: names and texts of files may hold anything, so that nothing is written but through here.
 
 use std::fmt::Write as _;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::Failure;
 
@@ -10,8 +11,27 @@ const MAX_WORD_CHARS: usize = 300;
 /// So is a message.
 const MAX_MESSAGE_CHARS: usize = 4000;
 
+/// `--quiet`: nothing is heard but errors, failed checks and results that were asked for.
+static IS_QUIET: AtomicBool = AtomicBool::new(false);
+
+pub(super) fn be_quiet() {
+    IS_QUIET.store(true, Ordering::Relaxed);
+}
+
+fn is_quiet() -> bool {
+    IS_QUIET.load(Ordering::Relaxed)
+}
+
+/// Progress is shown: somebody looks.
+pub(super) fn shows_progress() -> bool {
+    !is_quiet() && std::io::stderr().is_terminal()
+}
+
 /// A message to the user, one line.
 pub(super) fn say(kind: &str, message: &str) {
+    if is_quiet() && matches!(kind, "note" | "warning") {
+        return;
+    }
     // Without a stderr there is nobody to tell.
     let _ = writeln!(std::io::stderr(), "{kind}: {}", one_line(message));
 }
@@ -30,8 +50,19 @@ pub(super) fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
-/// The lines of a result that goes to stderr.
-pub(super) fn print_aside(text: &str) {
+/// What became of a command that writes files, to stdout.
+pub(super) fn summarize(text: &str) -> Result<(), Failure> {
+    match is_quiet() {
+        true => Ok(()),
+        false => print(text),
+    }
+}
+
+/// The same to stderr, where stdout has a file.
+pub(super) fn summarize_aside(text: &str) {
+    if is_quiet() {
+        return;
+    }
     // Without a stderr there is nobody to tell.
     let _ = std::io::stderr().write_all(escaped(text).as_bytes());
 }

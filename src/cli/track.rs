@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::progress::Steps;
-use super::terminal::print;
+use super::terminal::summarize;
 use super::threads::ThreadsFlag;
 use super::{Failure, Outcome};
-use crate::output::{check_writable, write_text};
+use crate::output::{check_writable_as, write_text};
 use crate::scene::trajectory::{Focal, read_intrinsics};
 use crate::tracking::{
     Family, Flatness, Lens, Target, Tone, TrackOptions, family_named, read_board, track,
@@ -81,6 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     arguments.threads.start()?;
     match (&arguments.print_board, &arguments.video) {
         (Some(board), _) => {
+            check_writable_as(&arguments.output, "svg")?;
             let svg = read_board(board)?.svg()?;
             write_text(&arguments.output, &svg)?;
         }
@@ -96,15 +97,17 @@ fn run_on(video: &Path, arguments: &Arguments) -> Result<(), Failure> {
     let (report, scene) = (arguments.report.as_ref(), arguments.scene.as_ref());
     let (overlay, sheet) = (arguments.overlay.as_ref(), arguments.sheet.as_ref());
     let outputs = [
-        Some(&arguments.output),
-        Some(&calibration),
-        report,
-        scene,
-        overlay,
-        sheet,
+        (Some(&arguments.output), "json"),
+        (Some(&calibration), "yaml"),
+        (report, "json"),
+        (scene, "toml"),
+        (overlay, "y4m"),
+        (sheet, "png"),
     ];
-    for path in outputs.into_iter().flatten() {
-        check_writable(path)?;
+    for (path, extension) in outputs {
+        if let Some(path) = path {
+            check_writable_as(path, extension)?;
+        }
     }
     let steps = Steps::new(0);
     let tracked = track(video, &options, &|frames| {
@@ -129,7 +132,7 @@ fn run_on(video: &Path, arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = sheet {
         session.write_sheet(video, path)?;
     }
-    print(&session.summary())
+    summarize(&session.summary())
 }
 
 impl Arguments {

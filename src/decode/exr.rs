@@ -1,5 +1,7 @@
 //! OpenEXR: the header is read and held against the limits first, then only the channels that are wanted are decoded.
 
+mod names;
+
 use crate::refusal::Refusal;
 use std::collections::HashSet;
 use std::io::Cursor;
@@ -12,6 +14,8 @@ use ::exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, Samp
 use ::exr::meta::header::Header;
 use ::exr::prelude::{FlatSamples, Vec2, f16};
 use rayon::prelude::*;
+
+use names::{Place, pick, pick_named};
 
 use super::channels::ChannelFile;
 use super::file::{MAX_PICTURE_BYTES, read_file};
@@ -77,10 +81,14 @@ fn read_channels(bytes: &[u8]) -> Result<ChannelFile, String> {
     Ok(file)
 }
 
-/// The picture among the parts and layers of a file, or the one of this name.
-pub(super) fn read_picture(bytes: &[u8], layer: Option<&str>) -> Result<ImageFile, String> {
+/// The picture among the parts and layers of a file, or the one of this name; its alpha is read `with_alpha`.
+pub(super) fn read_picture(
+    bytes: &[u8],
+    layer: Option<&str>,
+    with_alpha: bool,
+) -> Result<ImageFile, String> {
     let headers = read_headers(bytes)?;
-    let (part, rgb) = match layer {
+    let Place { part, rgb, alpha } = match layer {
         Some(layer) => pick_named(&headers, layer)?,
         None => pick(&headers)?,
     };
@@ -95,10 +103,11 @@ pub(super) fn read_picture(bytes: &[u8], layer: Option<&str>) -> Result<ImageFil
     {
         warnings.push("its chromaticities are ignored: it is read as linear Rec.709".to_owned());
     }
-    if find(header, "A").is_some() {
+    if alpha.is_some() && !with_alpha {
         warnings.push(ALPHA.to_owned());
     }
     let mut wanted = rgb.to_vec();
+    wanted.extend(alpha.filter(|_| with_alpha));
     wanted.dedup();
     ensure_memory((width, height), 12)?;
     let planes: Vec<Vec<f32>> = read_part(bytes, &headers, part, &wanted)?
@@ -113,19 +122,29 @@ pub(super) fn read_picture(bytes: &[u8], layer: Option<&str>) -> Result<ImageFil
             shown(window)
         ));
     }
-    let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
-    for (channel, index) in rgb.into_iter().enumerate() {
+    let count = width as usize * height as usize;
+    let mut pixels = vec![[0.0; 3]; count];
+    let plane_of = |index: usize| {
         let plane = wanted.iter().position(|w| *w == index);
-        let plane = plane.map_or(&[][..], |plane| &planes[plane]);
-        place(plane, data, window, |pixel, sample| {
+        plane.map_or(&[][..], |plane| &planes[plane])
+    };
+    for (channel, index) in rgb.into_iter().enumerate() {
+        place(plane_of(index), data, window, |pixel, sample| {
             pixels[pixel][channel] = sample;
+        });
+    }
+    let mut coverage = Vec::new();
+    if let Some(index) = alpha.filter(|_| with_alpha) {
+        coverage = vec![0.0; count];
+        place(plane_of(index), data, window, |pixel, sample| {
+            coverage[pixel] = sample;
         });
     }
     Ok(ImageFile {
         width,
         height,
         pixels: Pixels::Linear(pixels),
-        alpha: Vec::new(),
+        alpha: coverage,
         tags: Tags::default(),
         warnings,
     })
@@ -158,109 +177,6 @@ fn place(
 fn shown(window: IntegerBounds) -> String {
     let (Vec2(x, y), end) = (window.position, window.max());
     format!("({x}, {y})..({}, {})", end.0, end.1)
-}
-
-/// Names of a layer or part that hold the picture as such.
-const PICTURE_NAMES: [&str; 7] = [
-    "rgba",
-    "rgb",
-    "beauty",
-    "combined",
-    "composite",
-    "color",
-    "main",
-];
-
-/// A part and the channels of a picture.
-type Place = (usize, [usize; 3]);
-
-/// The pictures by their names: part and layer with a point between them, as far as they have any.
-fn pictures(headers: &[Header]) -> Vec<(String, Place)> {
-    let mut found = Vec::new();
-    for (part, header) in headers.iter().enumerate() {
-        let part_name = match (headers.len(), &header.own_attributes.layer_name) {
-            (2.., Some(name)) => text_of(name),
-            _ => String::new(),
-        };
-        for channel in &header.channels.list {
-            let name = text_of(&channel.name);
-            let Some(layer) = name
-                .strip_suffix('R')
-                .filter(|l| l.is_empty() || l.ends_with('.'))
-            else {
-                continue;
-            };
-            let rgb = ["R", "G", "B"].map(|c| find(header, &format!("{layer}{c}")));
-            if let [Some(r), Some(g), Some(b)] = rgb {
-                let names = [part_name.as_str(), layer.trim_end_matches('.')];
-                let whole = names.join(".").trim_matches('.').to_owned();
-                found.push((whole, (part, [r, g, b])));
-            }
-        }
-    }
-    found
-}
-
-/// By its name, or the end of it after a point.
-fn pick_named(headers: &[Header], layer: &str) -> Result<Place, String> {
-    let found = pictures(headers);
-    let is_whole = |(name, _): &&(String, Place)| name == layer;
-    let ends = |(name, _): &&(String, Place)| {
-        name.strip_suffix(layer)
-            .is_some_and(|rest| rest.ends_with('.'))
-    };
-    let mut alike = found.iter().filter(ends);
-    match (found.iter().find(is_whole), alike.next(), alike.next()) {
-        (Some((_, place)), ..) | (None, Some((_, place)), None) => Ok(*place),
-        _ => {
-            let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
-            Err(format!(
-                "it has no one picture \"{layer}\"; expected one of \"{}\"; correct the name after the #",
-                names.join("\", \"")
-            ))
-        }
-    }
-}
-
-/// The part and the channels that are the picture: those without a layer's name; else of a layer that is named so; else the only ones.
-fn pick(headers: &[Header]) -> Result<Place, String> {
-    let mut found = pictures(headers);
-    let rank = |name: &str| {
-        let last = name.rsplit('.').next().unwrap_or_default();
-        match last.to_ascii_lowercase() {
-            last if last.is_empty() => 0,
-            last if PICTURE_NAMES.contains(&last.as_str()) => 1,
-            _ => 2,
-        }
-    };
-    found.sort_by_key(|(name, (part, _))| (rank(name), *part));
-    match found.as_slice() {
-        [(name, place), rest @ ..] if rank(name) < 2 || rest.is_empty() => Ok(*place),
-        [] => grey(headers).ok_or_else(|| {
-            "it has no channels R, G, B or Y; expected an RGB or grey image; convert it".to_owned()
-        }),
-        several => {
-            let names: Vec<&str> = several.iter().map(|(name, ..)| name.as_str()).collect();
-            Err(format!(
-                "it holds several pictures ({}) and none is named as the one; expected R, G and B without a layer, or one of {}; name it, or say which after the file's name (a.exr#layer)",
-                names.join(", "),
-                PICTURE_NAMES.join(", ")
-            ))
-        }
-    }
-}
-
-/// With RY and BY beside it, Y alone would lose the colour.
-fn grey(headers: &[Header]) -> Option<(usize, [usize; 3])> {
-    headers.iter().enumerate().find_map(|(part, header)| {
-        let grey = find(header, "Y").filter(|_| find(header, "RY").is_none())?;
-        Some((part, [grey; 3]))
-    })
-}
-
-fn find(header: &Header, name: &str) -> Option<usize> {
-    let channels = &header.channels.list;
-    channels.iter().position(|channel| channel.name.eq(name))
 }
 
 /// The headers of a file, each within the limits and not beyond what the file can hold.

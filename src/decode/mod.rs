@@ -34,7 +34,8 @@ pub(crate) const MAX_SIDE_PX: u32 = 32768;
 /// Most pixels of an image.
 pub(crate) const MAX_PIXELS: u64 = 1 << 28;
 
-const ALPHA: &str = "its alpha channel is ignored";
+/// What is said of a picture whose alpha nobody wants.
+pub(crate) const ALPHA: &str = "its alpha channel is ignored";
 
 /// An image as its file holds it, grey spread to three channels, alpha left out, row-major from the top left.
 #[derive(Debug)]
@@ -81,17 +82,28 @@ pub(crate) fn split_layer(path: &Path) -> (PathBuf, Option<&str>) {
 /// Reads an image; of an OpenEXR file the layer after `#`, or else the one that is the picture.
 pub(crate) fn read_image(path: &Path) -> Result<ImageFile, String> {
     let (file, layer) = split_layer(path);
-    let bytes = read_file(&file, MAX_PICTURE_BYTES).map_err(|reason| {
+    let bytes = read_bytes(&file)?;
+    decode_layer(&bytes, layer, false)
+}
+
+/// As [`read_image`], with the alpha of OpenEXR files.
+pub(crate) fn read_image_with_alpha(path: &Path) -> Result<ImageFile, String> {
+    let (file, layer) = split_layer(path);
+    let bytes = read_bytes(&file)?;
+    decode_layer(&bytes, layer, true)
+}
+
+fn read_bytes(file: &Path) -> Result<Vec<u8>, String> {
+    read_file(file, MAX_PICTURE_BYTES).map_err(|reason| {
         format!(
             "it cannot be read ({reason}); expected an image file; correct the path or the rights"
         )
-    })?;
-    decode_layer(&bytes, layer)
+    })
 }
 
 /// Decodes an image file's bytes.
 pub(crate) fn decode_image(bytes: &[u8]) -> Result<ImageFile, String> {
-    decode_layer(bytes, None)
+    decode_layer(bytes, None, false)
 }
 
 /// What can be decoded of an image file's bytes that are cut off: of JPEG what there is, of other formats nothing.
@@ -102,12 +114,12 @@ pub(crate) fn decode_cut_image(bytes: &[u8]) -> Option<ImageFile> {
     }
 }
 
-fn decode_layer(bytes: &[u8], layer: Option<&str>) -> Result<ImageFile, String> {
+fn decode_layer(bytes: &[u8], layer: Option<&str>, with_alpha: bool) -> Result<ImageFile, String> {
     let image = guarded(|| match bytes {
         [0x89, b'P', b'N', b'G', ..] => codes::read_png(bytes),
         [0xff, 0xd8, ..] => codes::read_jpeg(bytes),
         [b'#', b'?', ..] => hdr::read_hdr(bytes),
-        [0x76, 0x2f, 0x31, 0x01, ..] => exr::read_picture(bytes, layer),
+        [0x76, 0x2f, 0x31, 0x01, ..] => exr::read_picture(bytes, layer, with_alpha),
         _ => Err("its format is not known; expected PNG, JPEG, OpenEXR or Radiance HDR; convert the image".to_owned()),
     })
     .unwrap_or_else(|thrown| Err(broken(thrown)))?;

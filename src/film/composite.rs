@@ -125,6 +125,11 @@ impl Means {
         }
     }
 
+    /// What virtual things add to the real light that shows, and take from it, in the additive composite.
+    pub fn change(&self) -> DVec3 {
+        self.diff - (self.m_ir * (1.0 - self.mask) - self.r_ir * self.mask)
+    }
+
     /// What the quotient composite multiplies the photograph with; right only where a real sample was taken.
     pub fn quotient(&self) -> DVec3 {
         DVec3::ONE + self.diff / self.r_ir.max(DVec3::splat(QUOTIENT_EPSILON))

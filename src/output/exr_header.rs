@@ -1,6 +1,14 @@
-//! One order for the attributes of an OpenEXR header: the `exr` crate writes them in that of a hash map, which changes from run to run.
+//! One order for the attributes of an OpenEXR header, and a seal over the file.
+//!
+//! The `exr` crate writes attributes in the order of a hash map, which changes from run to run. Blocks that are stored as they are have no
+//! checksum: the seal tells a damaged file from a whole one.
 
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
+
+use exr::prelude::Text;
+use exr::prelude::attribute::AttributeValue;
+
+use super::exr_text::text_value;
 
 /// Magic number and version.
 const BEFORE_HEADER_BYTES: u64 = 8;
@@ -39,4 +47,42 @@ fn read_attribute(header: &mut impl BufRead) -> io::Result<Option<Vec<u8>>> {
         true => Ok(Some(bytes)),
         false => Err(io::ErrorKind::UnexpectedEof.into()),
     }
+}
+
+/// The attribute that holds the seal: a hash of the file in which the seal's digits are zeros.
+const SEAL: &str = "mixray.seal";
+/// Of [`blake3`], in hexadecimal digits.
+const SEAL_DIGITS: usize = 64;
+
+/// The attribute as it is before [`seal`].
+pub(super) fn unsealed() -> (Text, AttributeValue) {
+    (Text::from(SEAL), text_value(&"0".repeat(SEAL_DIGITS)))
+}
+
+/// Seals a file that has [`unsealed`].
+pub(super) fn seal(file: &mut [u8]) {
+    if let Some(at) = seal_at(file) {
+        let digits = blake3::hash(file).to_hex();
+        file[at..at + SEAL_DIGITS].copy_from_slice(digits.as_bytes());
+    }
+}
+
+/// No byte has changed since the file was sealed.
+pub(crate) fn is_sealed(file: &[u8]) -> bool {
+    let Some(at) = seal_at(file) else {
+        return false;
+    };
+    let mut hash = blake3::Hasher::new();
+    hash.update(&file[..at]);
+    hash.update(&[b'0'; SEAL_DIGITS]);
+    hash.update(&file[at + SEAL_DIGITS..]);
+    hash.finalize().to_hex().as_bytes() == &file[at..at + SEAL_DIGITS]
+}
+
+/// Where the digits stand. The zero bytes of name and type are in no text before them.
+fn seal_at(file: &[u8]) -> Option<usize> {
+    let head = [SEAL.as_bytes(), b"\0string\0"].concat();
+    let begin = file.windows(head.len()).position(|bytes| bytes == head)?;
+    let at = begin + head.len() + size_of::<u32>();
+    (at + SEAL_DIGITS <= file.len()).then_some(at)
 }

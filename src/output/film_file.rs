@@ -5,10 +5,11 @@ use std::path::Path;
 use bytemuck::Zeroable;
 
 use super::ChannelFile;
-use super::exr_file::{Channels, push_channel, write_layers};
+use super::channels::{Channels, push_channel};
+use super::exr_file::write_layers;
 use super::film_note::{FORM, FilmNote, NOTE, NOTE_OF_FORM_1};
-use super::{Metadata, OutputError, Target};
-use crate::film::{Film, GroupSums, GuideSums, Picture, PixelSums, Planes, SplatSums, Sum3};
+use super::{ExrPicture, OutputError, Target};
+use crate::film::{Film, GroupSums, GuideSums, PixelSums, SplatSums, Sum3};
 use crate::refusal::Refusal;
 use crate::scene::Combine;
 
@@ -18,9 +19,7 @@ use crate::scene::Combine;
 /// If the file cannot be written; what was there before then still is.
 pub fn write_film(
     target: &Target,
-    picture: &Picture,
-    planes: &Planes,
-    metadata: &Metadata,
+    exr: &ExrPicture,
     film: &Film,
     note: &FilmNote,
 ) -> Result<(), OutputError> {
@@ -54,14 +53,7 @@ pub fn write_film(
         }
     }
     let text = note.to_text(folder_of(target.path()));
-    write_layers(
-        target,
-        picture,
-        planes,
-        metadata,
-        channels,
-        [(NOTE, text.as_str())].into_iter(),
-    )
+    write_layers(target, exr, channels, [(NOTE, text.as_str())].into_iter())
 }
 
 fn folder_of(path: &Path) -> &Path {

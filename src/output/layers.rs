@@ -1,12 +1,13 @@
 //! Which planes a picture is written with.
 
-use crate::film::{Picture, Planes};
-use crate::scene::Composite;
-
 /// A layer of an EXR file; the composite has no name there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExrLayer {
     Composite,
+    Virtual,
+    Change,
+    Ratio,
+    Noise,
     Mixed,
     Real,
     Difference,
@@ -19,8 +20,12 @@ pub enum ExrLayer {
 }
 
 impl ExrLayer {
-    pub const NAMES: [(&str, Self); 10] = [
+    pub const NAMES: [(&str, Self); 14] = [
         ("composite", Self::Composite),
+        ("virtual", Self::Virtual),
+        ("change", Self::Change),
+        ("ratio", Self::Ratio),
+        ("noise", Self::Noise),
         ("difference", Self::Difference),
         ("mask", Self::Mask),
         ("depth", Self::Depth),
@@ -33,9 +38,12 @@ impl ExrLayer {
     ];
 
     /// What a compositor needs and costs no rays beyond those of the composite.
-    const USUAL: [Self; 7] = [
+    const USUAL: [Self; 10] = [
         Self::Composite,
-        Self::Difference,
+        Self::Virtual,
+        Self::Change,
+        Self::Ratio,
+        Self::Noise,
         Self::Mask,
         Self::Depth,
         Self::Normal,
@@ -61,13 +69,12 @@ impl std::str::FromStr for ExrLayer {
 pub struct ExrLayers(Vec<ExrLayer>);
 
 impl ExrLayers {
-    /// Those asked for; of none, those that are usual: with the real light where the composite takes it everywhere.
-    pub fn new(asked: &[ExrLayer], composite: Composite) -> Self {
-        if !asked.is_empty() {
-            return Self(asked.to_vec());
+    /// Those asked for; of none, those that are usual.
+    pub fn new(asked: &[ExrLayer]) -> Self {
+        match asked {
+            [] => Self(ExrLayer::USUAL.to_vec()),
+            asked => Self(asked.to_vec()),
         }
-        let real = (composite == Composite::Quotient).then_some(ExrLayer::Real);
-        Self(ExrLayer::USUAL.into_iter().chain(real).collect())
     }
 
     pub fn all() -> Self {
@@ -86,35 +93,19 @@ impl ExrLayers {
             .any(|layer| self.has(*layer))
     }
 
-    fn has(&self, layer: ExrLayer) -> bool {
-        self.0.contains(&layer)
+    /// The composite is taken apart.
+    pub(super) fn need_parts(&self) -> bool {
+        [ExrLayer::Virtual, ExrLayer::Change, ExrLayer::Ratio]
+            .iter()
+            .any(|layer| self.has(*layer))
     }
 
-    /// Empties what is not among them, so that it is left out.
-    pub fn pick(&self, picture: &mut Picture, planes: &mut Planes) {
-        let colours = [
-            (ExrLayer::Composite, &mut picture.linear),
-            (ExrLayer::Mixed, &mut planes.mixed),
-            (ExrLayer::Real, &mut planes.real),
-            (ExrLayer::Difference, &mut planes.difference),
-            (ExrLayer::Albedo, &mut planes.albedo),
-            (ExrLayer::Variance, &mut planes.variance),
-            (ExrLayer::Normal, &mut planes.normal),
-        ];
-        for (layer, values) in colours {
-            if !self.has(layer) {
-                values.clear();
-            }
-        }
-        let numbers = [
-            (ExrLayer::Mask, &mut planes.mask),
-            (ExrLayer::Depth, &mut planes.depth),
-            (ExrLayer::Samples, &mut planes.samples),
-        ];
-        for (layer, values) in numbers {
-            if !self.has(layer) {
-                values.clear();
-            }
-        }
+    /// What the noise stage adds is kept.
+    pub fn need_noise(&self) -> bool {
+        self.has(ExrLayer::Noise)
+    }
+
+    pub(super) fn has(&self, layer: ExrLayer) -> bool {
+        self.0.contains(&layer)
     }
 }

@@ -1,10 +1,15 @@
 //! Pictures to files: PNG and multilayer EXR, written beside the target and renamed, so that no broken picture is ever left.
 
+mod channels;
 mod exr_file;
 mod exr_header;
+mod exr_picture;
+mod exr_text;
+mod extension;
 mod film_file;
 mod film_note;
 mod layers;
+mod metadata;
 mod plain;
 mod png_file;
 mod reference_file;
@@ -12,14 +17,19 @@ mod target;
 mod temporary;
 
 pub use crate::decode::ChannelFile;
-pub use exr_file::{Metadata, write_exr};
+pub use exr_file::write_exr;
+pub(crate) use exr_header::is_sealed;
+pub use exr_picture::ExrPicture;
+pub(crate) use extension::{check_folder_name, extension_among};
 pub use film_file::{read_film, write_film};
 pub use film_note::FilmNote;
 pub use layers::{ExrLayer, ExrLayers};
+pub use metadata::Metadata;
 pub use plain::{write_composite, write_image};
 pub(crate) use png_file::{PNG_END, picture_codes8};
 pub use png_file::{PngBits, write_png};
 pub use reference_file::write_reference;
+pub(crate) use target::check_writable_as;
 #[cfg(feature = "cli")]
 pub(crate) use target::new_beside;
 #[cfg(feature = "bench")]
@@ -33,8 +43,10 @@ use std::path::PathBuf;
 /// A picture or report could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    #[error("{}: the name must end in .png or .exr", path.display())]
-    Extension { path: PathBuf },
+    #[error("{}: the name ends in what cannot be written here; expected {expected}; name it so", path.display())]
+    Extension { path: PathBuf, expected: String },
+    #[error("{}: its name has no end that tells what it is; expected {expected}; name it so", path.display())]
+    NoExtension { path: PathBuf, expected: String },
     #[error("{}: is a folder or another special file; name a file to write", path.display())]
     NotAFile { path: PathBuf },
     #[error(transparent)]

@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::exr_file::{Channels, push_three, write_channels};
+use super::channels::{Channels, Precision, push_three};
+use super::exr_file::write_channels;
 use super::{Format, OutputError, PngBits, Target, write_png};
 use crate::film::Picture;
 use crate::scene::Photo;
@@ -36,7 +37,13 @@ pub fn write_composite(
 
 fn write_rgb(target: &Target, picture: &Picture) -> Result<(), OutputError> {
     let mut channels = Channels::new();
-    push_three(&mut channels, "", ["R", "G", "B"], &picture.linear);
+    push_three(
+        &mut channels,
+        "",
+        ["R", "G", "B"],
+        &picture.linear,
+        Precision::Single,
+    );
     let nothing_more = HashMap::new();
     write_channels(
         target,

@@ -1,6 +1,8 @@
 //! A converged picture with its standard error, for benchmarks.
 
-use super::exr_file::{Channels, push_channel, push_three, text_value, write_channels};
+use super::channels::{Channels, Precision, push_channel, push_three};
+use super::exr_file::write_channels;
+use super::exr_text::text_value;
 use super::{OutputError, Target};
 use crate::film::Picture;
 use exr::prelude::Text;
@@ -17,8 +19,10 @@ pub fn write_reference(
     texts: &[(&str, String)],
 ) -> Result<(), OutputError> {
     let mut channels = Channels::new();
-    push_three(&mut channels, "", ["R", "G", "B"], &picture.linear);
-    push_three(&mut channels, "error.", ["R", "G", "B"], standard_error);
+    for (layer, values) in [("", &*picture.linear), ("error.", standard_error)] {
+        let rgb = ["R", "G", "B"];
+        push_three(&mut channels, layer, rgb, values, Precision::Single);
+    }
     push_channel(&mut channels, "mask.Y", mask.to_vec());
     let attributes = texts
         .iter()

@@ -6,6 +6,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::OutputError;
+use super::extension::extension_among;
 use super::temporary::{self, cut, remove_leftovers};
 use crate::files;
 
@@ -13,6 +14,18 @@ use crate::files;
 pub enum Format {
     Png,
     Exr,
+}
+
+impl Format {
+    const EXTENSIONS: [&str; 2] = ["png", "exr"];
+
+    /// What names of its files end in, without the point.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Exr => "exr",
+        }
+    }
 }
 
 /// A picture file that can be written, as far as can be known without writing it.
@@ -28,12 +41,14 @@ impl Target {
     /// # Errors
     /// Another extension, a missing or read-only folder, a target that is no regular file, an input or another output.
     pub fn picture(path: &Path) -> Result<Self, OutputError> {
-        let extension = path.extension().map(|e| e.to_ascii_lowercase());
-        let format = match extension.as_ref().and_then(|e| e.to_str()) {
+        let format = match extension_among(path, &Format::EXTENSIONS)? {
             Some("png") => Format::Png,
-            Some("exr") => Format::Exr,
-            _ => {
-                return Err(OutputError::Extension { path: path.into() });
+            Some(_) => Format::Exr,
+            None => {
+                return Err(OutputError::NoExtension {
+                    path: path.into(),
+                    expected: ".png or .exr".to_owned(),
+                });
             }
         };
         check_writable(path)?;
@@ -64,6 +79,14 @@ impl Target {
 pub(crate) fn check_writable(path: &Path) -> Result<(), OutputError> {
     let (folder, name) = folder_and_name(&check_named(path)?)?;
     remove_leftovers(&folder, |output| output == cut(&name));
+    Ok(())
+}
+
+/// [`check_writable`] of a file of one kind, whose name ends in `extension` if it has an end.
+#[cfg(feature = "cli")]
+pub(crate) fn check_writable_as(path: &Path, extension: &'static str) -> Result<(), OutputError> {
+    check_writable(path)?;
+    extension_among(path, &[extension])?;
     Ok(())
 }
 

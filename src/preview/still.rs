@@ -5,10 +5,12 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
 use super::render_threads::{Stop, polite_pool};
-use crate::output::{Format, Metadata, PngBits, Target, write_exr, write_png};
-use crate::renderer::{Budget, Progress, Renderer, RendererOptions, Watcher};
+use crate::output::{
+    ExrLayers, ExrPicture, Format, Metadata, PngBits, Target, write_exr, write_png,
+};
+use crate::renderer::{Budget, Delivered, Progress, Renderer, RendererOptions, Watcher};
 use crate::scene::Scene;
-use crate::stages::finish;
+use crate::stages::finish_with_noise;
 
 /// Below both renderers of the window.
 const STILL_NICE: i32 = 15;
@@ -120,17 +122,17 @@ fn render(
         return Ok(());
     }
     let scene = renderer.scene();
-    let picture = renderer.delivered().picture;
-    let picture = finish(picture, renderer.film(), scene, 0, None, None).picture;
+    let Delivered { picture, film, .. } = renderer.delivered();
+    let finished = finish_with_noise(picture, renderer.film(), scene, 0, None, None);
     let photo = scene.photo.as_ref();
     let written = match is_exr {
-        true => write_exr(
-            target,
-            &picture,
-            &renderer.planes(),
-            &Metadata::of(&renderer),
-        ),
-        false => write_png(target, &picture, photo, PngBits::for_photo(photo)),
+        true => {
+            let metadata = Metadata::of(&renderer, scene.fingerprint());
+            let layers = ExrLayers::new(&[]);
+            let exr = ExrPicture::of(&renderer, metadata, &film, finished, &layers);
+            write_exr(target, &exr)
+        }
+        false => write_png(target, &finished.picture, photo, PngBits::for_photo(photo)),
     };
     written.map_err(|error| error.to_string())
 }

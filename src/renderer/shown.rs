@@ -13,8 +13,10 @@ use crate::scene::Composite;
 
 /// What is delivered of a film.
 #[derive(Clone, Debug)]
-pub struct Delivered {
+pub struct Delivered<'a> {
     pub picture: Picture,
+    /// The film that it is composited from.
+    pub film: Cow<'a, Film>,
     /// Of the difference in real pixels, the share that the robust combination gave to other pixels nearby; `None` for means.
     pub moved: Option<f64>,
 }
@@ -35,7 +37,7 @@ impl Renderer {
     }
 
     /// The picture as it is delivered: with the scene's combination of samples, or filtered.
-    pub fn delivered(&self) -> Delivered {
+    pub fn delivered(&self) -> Delivered<'_> {
         let film = &self.core.film;
         // A quotient multiplies the photograph, whose grain would come into the difference as well.
         let photo = match self.core.scene.settings.composite {
@@ -43,18 +45,22 @@ impl Renderer {
             Composite::Quotient => None,
         };
         let counts = |pixel| self.group_counts(pixel);
-        let (picture, moved) = match self.core.options.filter {
+        let (film, moved) = match self.core.options.filter {
             Some(Filter::Final) => {
                 let film = filter_finally(film, photo, &self.surfaces, counts);
-                (self.composited(&film), None)
+                (Cow::Owned(film), None)
             }
             None if !film.groups.is_empty() => {
                 let Combined { film, moved } = combine_robustly(film, photo, counts);
-                (self.composited(&film), Some(moved))
+                (Cow::Owned(film), Some(moved))
             }
-            Some(Filter::Preview) | None => (self.picture(), None),
+            Some(Filter::Preview) | None => (self.shown(), None),
         };
-        Delivered { picture, moved }
+        Delivered {
+            picture: self.composited(&film),
+            film,
+            moved,
+        }
     }
 
     /// Evaluations of a pixel's difference, by group.

@@ -41,7 +41,7 @@ pub use error::SceneError;
 pub use file::{Given, load, load_text, load_with};
 pub use fingerprint::{Content, ContentHash};
 pub use material::Material;
-pub use photo::{read_codes, read_coverage};
+pub use photo::{LayerPicture, read_codes, read_coverage, read_layer};
 pub use reader::Choice;
 pub use settings::Overrides;
 pub use shutter::{MotionKey, ObjectMotion, Shutter};

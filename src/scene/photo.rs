@@ -7,7 +7,8 @@ use super::reader::{Choice, Node, Table};
 use super::srgb::{decode8, decode16};
 use super::{Backdrop, EncodedPhoto, Exposure, Photo};
 use crate::decode::{
-    ImageFile, Pixels, Tags, decode_cut_image, decode_image, read_image, turned, turned_size,
+    ALPHA, ImageFile, Pixels, Tags, decode_cut_image, decode_image, read_image,
+    read_image_with_alpha, turned, turned_size,
 };
 use crate::refusal::Refusal;
 use image::metadata::Orientation;
@@ -151,6 +152,47 @@ pub fn read_coverage(path: &Path) -> std::result::Result<(u32, u32, Vec<f32>), R
         Pixels::Linear(pixels) => pixels.iter().map(|value| value[0]).collect(),
     };
     Ok((image.width, image.height, coverage))
+}
+
+/// A picture of another program with its own coverage, linear Rec.709, row-major from the top left.
+#[derive(Clone, Debug)]
+pub struct LayerPicture {
+    pub width: u32,
+    pub height: u32,
+    pub linear: Vec<[f32; 3]>,
+    /// Its alpha; empty where it has none, or none that is not 1.
+    pub alpha: Vec<f32>,
+    /// Colours are times alpha, as OpenEXR wants them; PNG wants them straight.
+    pub is_premultiplied: bool,
+}
+
+/// Reads a layer (PNG, OpenEXR and whatever else [`Photo::read`] takes), with warnings of what in it is ignored.
+///
+/// # Errors
+/// Why the file cannot be used, in one line without its path.
+pub fn read_layer(path: &Path) -> std::result::Result<(LayerPicture, Vec<String>), Refusal> {
+    let mut image = read_image_with_alpha(path)?;
+    image.warnings.retain(|warning| warning != ALPHA);
+    let alpha = std::mem::take(&mut image.alpha);
+    if let Some(bad) = alpha.iter().position(|a| !a.is_finite()) {
+        let width = image.width as usize;
+        return Err(format!(
+            "the alpha of pixel ({}, {}) is NaN or infinite; expected 0 to 1; repair the picture",
+            bad % width,
+            bad / width
+        )
+        .into());
+    }
+    let is_premultiplied = matches!(image.pixels, Pixels::Linear(_)) && !alpha.is_empty();
+    let (photo, warnings) = Photo::of(image);
+    let layer = LayerPicture {
+        width: photo.width,
+        height: photo.height,
+        linear: photo.linear,
+        alpha,
+        is_premultiplied,
+    };
+    Ok((layer, warnings))
 }
 
 impl Photo {

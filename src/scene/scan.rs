@@ -35,7 +35,7 @@ pub(super) fn settle_scan(
     object.self_shadow_bias_m = bias_m as f32;
     Ok(detected.map(|_| {
         format!(
-            "{}: has the noise of a depth camera; taken: smooth_radius_m = {radius_m:.4}, self_shadow_bias_m = {bias_m:.4} (give smooth_radius_m = 0 to leave it as it is)",
+            "{}: smoothed as a depth camera's mesh, by smooth_radius_m = {radius_m:.4} and self_shadow_bias_m = {bias_m:.4}; smooth_radius_m = 0 leaves it as it is",
             object.name
         )
     }))

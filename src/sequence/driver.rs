@@ -8,16 +8,18 @@ use glam::DVec3;
 
 use super::plan::{Files, in_part, in_range};
 use super::report::{FrameCounts, SequenceSeconds, SequenceStats};
-use super::whole::{Whole, open_source};
+use super::whole::{Whole, open_source, output_of};
 use super::{Event, SequenceError, SequenceOptions};
+use crate::output::{ExrLayers, ExrPicture, Format, Metadata};
 use crate::pack::next_anchor;
 use crate::renderer::{
-    Budget, ErrorGoal, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
+    Budget, Delivered, ErrorGoal, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions,
+    Watcher,
 };
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{Camera, Lens, MotionBlurMethod, Scene};
-use crate::stages::{Finished, GpuStages, finish};
-use crate::video::{FrameSink, Header, Pixels, SinkPlan, Taken, VideoFrame};
+use crate::stages::{Finished, GpuStages, finish, finish_with_noise};
+use crate::video::{FrameOutput, FrameSink, Header, Pixels, SinkPlan, Taken, VideoFrame};
 
 /// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
 const REACH_FRAMES: f64 = 1.5;
@@ -40,9 +42,10 @@ pub fn render_sequence(
     watcher: &Watcher<'_>,
     hear: &dyn Fn(&Event<'_>),
 ) -> Result<RenderedSequence, SequenceError> {
+    let output = output_of(options)?;
     let files = Files::read(options)?;
     let mut source = open_source(options)?;
-    let whole = Whole::new(options, &files, &source, hear)?;
+    let whole = Whole::new(options, output, &files, &source, hear)?;
     hear(&Event::Plan {
         frames: whole.names_of_part().map(|names| names.len()),
     });
@@ -98,7 +101,11 @@ pub fn render_sequence(
         }
         hear(&Event::Ends { label, number });
     };
-    sequence.end(complete)
+    let rendered = sequence.end(complete)?;
+    if complete && options.range.is_some() {
+        source.drain(&|| watcher.is_cancelled());
+    }
+    Ok(rendered)
 }
 
 struct Sequence<'a> {
@@ -118,6 +125,8 @@ struct Sequence<'a> {
 /// What the first frame brings to life.
 struct Started {
     sink: FrameSink,
+    /// Without the photographs.
+    scene_hash: String,
     size: (u32, u32),
     /// Frames are turned as their tags say.
     upright: bool,
@@ -230,7 +239,10 @@ impl Sequence<'_> {
             // Fitted once, to the first posed frame of the range, whether or not that one is finished.
             scene.photo = Some(frame.photo.clone());
             scene.camera = camera.clone();
+            let layers = started.sink.layers();
             let with = RendererOptions {
+                guides: layers.is_some_and(ExrLayers::need_guides),
+                real_everywhere: layers.is_some_and(ExrLayers::need_real_everywhere),
                 without: self.whole.options.without,
                 filter: self.whole.options.filter,
                 ..RendererOptions::default()
@@ -285,18 +297,19 @@ impl Sequence<'_> {
             return Ok(false);
         }
         let begin = Instant::now();
-        let picture = renderer.delivered().picture;
+        let Delivered { picture, film, .. } = renderer.delivered();
         self.seconds.composite += begin.elapsed().as_secs_f64();
         let copies = (renderer.scene().stages.motion_blur)
             .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);
         let motion = previous
             .filter(|_| copies)
             .map(|previous| renderer.picture_motion(&previous));
-        let Finished {
-            picture,
-            notes,
-            seconds,
-        } = finish(
+        let layers = started.sink.layers().cloned();
+        let finish = match layers.as_ref().is_some_and(ExrLayers::need_noise) {
+            true => finish_with_noise,
+            false => finish,
+        };
+        let finished = finish(
             picture,
             renderer.film(),
             renderer.scene(),
@@ -304,6 +317,17 @@ impl Sequence<'_> {
             motion.as_ref(),
             started.gpu.as_ref(),
         );
+        let exr = layers.map(|layers| {
+            let metadata = Metadata::of(renderer, started.scene_hash.clone());
+            ExrPicture::of(renderer, metadata, &film, finished.clone(), &layers)
+        });
+        drop(film);
+        let Finished {
+            picture,
+            notes,
+            seconds,
+            ..
+        } = finished;
         self.seconds.stages.add(&seconds);
         self.frames.rendered += 1;
         self.frames.moving += u32::from(renderer.is_moving());
@@ -318,7 +342,10 @@ impl Sequence<'_> {
             }
         }
         let begin = Instant::now();
-        started.sink.write(name, &picture, &frame)?;
+        match &exr {
+            Some(exr) => started.sink.write_exr(name, exr)?,
+            None => started.sink.write(name, &picture, &frame)?,
+        }
         self.seconds.write += begin.elapsed().as_secs_f64();
         self.rays = renderer.rays();
         Ok(true)
@@ -375,8 +402,12 @@ impl Sequence<'_> {
         let options = self.whole.options;
         let mut header = header.unwrap_or_else(|| Header::new(size.0, size.1, self.whole.rate));
         header.matrix = options.matrix.unwrap_or(header.matrix);
+        let layers = ExrLayers::new(&options.layers);
         let sink = FrameSink::open(SinkPlan {
             path: &options.output,
+            output: self.whole.output.clone(),
+            layers,
+            composite: scene.settings.composite,
             fingerprint: self.whole.fingerprint(&scene),
             header,
             png_bits: options.png_bits,
@@ -385,6 +416,7 @@ impl Sequence<'_> {
         })?;
         Ok(Started {
             sink,
+            scene_hash: scene.fingerprint(),
             size,
             lens: scene.lens,
             upright: scene.settings.upright_photo,

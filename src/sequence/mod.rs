@@ -30,7 +30,7 @@ pub use driver::{RenderedSequence, render_sequence};
 pub use report::{FrameCounts, SequenceSeconds, SequenceStats};
 pub use survey::{Survey, survey};
 
-use crate::output::{OutputError, PngBits};
+use crate::output::{ExrLayer, Format, OutputError, PngBits};
 use crate::renderer::{Filter, Goal, RenderError, Without};
 use crate::scene::trajectory::TrajectoryError;
 use crate::scene::{Overrides, SceneError};
@@ -55,8 +55,12 @@ pub struct SequenceOptions {
     pub trajectory: PathBuf,
     /// OpenCV calibration in place of the intrinsics of trajectory and scene.
     pub intrinsics: Option<PathBuf>,
-    /// Folder for PNG files, .y4m file, or `-` for Y4M on standard output.
+    /// Folder for pictures, pattern of their names (`out.####.exr`), .y4m file, or `-` for Y4M on standard output.
     pub output: PathBuf,
+    /// Of pictures in a folder; PNG where it is not given.
+    pub format: Option<Format>,
+    /// Of EXR files; none: those that are usual.
+    pub layers: Vec<ExrLayer>,
     /// Numbers of the frames to render, the end not included.
     pub range: Option<(u32, u32)>,
     /// Of the range only these are rendered and written, the end not included, each equal to the same frame of the whole range.
@@ -97,6 +101,8 @@ impl SequenceOptions {
             trajectory: trajectory.into(),
             intrinsics: None,
             output: output.into(),
+            format: None,
+            layers: Vec::new(),
             range: None,
             part: None,
             allow_gaps: false,

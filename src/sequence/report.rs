@@ -104,6 +104,9 @@ impl SequenceStats {
         if let Some(colours) = &self.film_colours {
             let _ = writeln!(text, "film in {colours} (--matrix)");
         }
+        if rendered == 0 {
+            return text;
+        }
         let each = |seconds: f64| 1e3 * seconds / f64::from(rendered.max(1));
         let _ = write!(
             text,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::plan::{Files, in_range};
-use super::whole::{Whole, open_source};
+use super::whole::{Whole, open_source, output_of};
 use super::{Event, SequenceError, SequenceOptions};
 use crate::scene::Scene;
 use crate::scene::trajectory::FrameName;
@@ -30,9 +30,10 @@ pub fn survey(
     options: &SequenceOptions,
     hear: &dyn Fn(&Event<'_>),
 ) -> Result<Survey, SequenceError> {
+    let output = output_of(options)?;
     let files = Files::read(options)?;
     let mut source = open_source(options)?;
-    let whole = Whole::new(options, &files, &source, hear)?;
+    let whole = Whole::new(options, output, &files, &source, hear)?;
     let frames = match source.is_stream() {
         true => (whole.names.clone()).map(|names| names.into_iter().map(|n| (n, None)).collect()),
         false => Some(

@@ -2,13 +2,14 @@
 
 use super::plan::{Files, check_frames, check_rate, in_part, in_range, known_rate, views};
 use super::{Event, SequenceError, SequenceOptions};
-use crate::output::PngBits;
+use crate::output::{ExrLayers, Format, PngBits};
 use crate::scene::trajectory::{FrameName, FrameView, Views};
 use crate::scene::{BackendChoice, Content, ContentHash, Exposure, Photo, Scene};
-use crate::video::{FrameSource, Matrix};
+use crate::video::{FrameOutput, FrameSource, Matrix};
 
 pub(super) struct Whole<'a> {
     pub options: &'a SequenceOptions,
+    pub output: FrameOutput,
     pub files: &'a Files,
     pub views: Views<'a>,
     /// Frames a second, where known.
@@ -17,6 +18,18 @@ pub(super) struct Whole<'a> {
     pub span: Option<(u32, u32)>,
     /// The frames of the range, where they are known.
     pub names: Option<Vec<FrameName>>,
+}
+
+/// Where the frames of `options` go: a name that promises what cannot be written is told before anything is read.
+pub(super) fn output_of(options: &SequenceOptions) -> Result<FrameOutput, SequenceError> {
+    let output = FrameOutput::of(&options.output, options.format)?;
+    if !options.layers.is_empty() && output.format() != Some(Format::Exr) {
+        return Err(SequenceError::Unfit(format!(
+            "{}: it has no layers; expected EXR frames for --layers; give --format exr, or a name like out.####.exr",
+            options.output.display()
+        )));
+    }
+    Ok(output)
 }
 
 /// The frames of `options`, to be read.
@@ -39,6 +52,7 @@ impl<'a> Whole<'a> {
     /// Frames and trajectory do not fit together, as far as can be known before the frames are read.
     pub fn new(
         options: &'a SequenceOptions,
+        output: FrameOutput,
         files: &'a Files,
         source: &FrameSource,
         hear: &dyn Fn(&Event<'_>),
@@ -61,6 +75,7 @@ impl<'a> Whole<'a> {
         }
         Ok(Self {
             options,
+            output,
             files,
             views,
             rate,
@@ -102,7 +117,7 @@ impl<'a> Whole<'a> {
         let png_bits = (options.png_bits).map(|bits| bits == PngBits::Sixteen);
         // What is fitted or pulled over the frames depends on which there are; a file tells by their order which it holds.
         let fits = settings.exposure == Exposure::Auto;
-        let is_file = options.output.extension().is_some_and(|e| e == "y4m");
+        let is_file = matches!(self.output, FrameOutput::Y4m(_));
         let scope = (fits || options.focus_pull_m.is_some() || is_file)
             .then_some((options.range, self.span));
         let mut hash = ContentHash::default();
@@ -115,6 +130,9 @@ impl<'a> Whole<'a> {
         options.matrix.map(Matrix::name).add_to(&mut hash);
         let names = self.names.as_deref().unwrap_or_default();
         self.views.folder_of(names).add_to(&mut hash);
+        if self.output.format() == Some(Format::Exr) {
+            format!("{:?}", ExrLayers::new(&options.layers)).add_to(&mut hash);
+        }
         if let (Some(part), true) = (options.part, is_file) {
             part.add_to(&mut hash);
         }

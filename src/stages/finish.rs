@@ -74,6 +74,8 @@ impl Shot<'_> {
 #[derive(Clone, Debug)]
 pub struct Finished {
     pub picture: Picture,
+    /// What the noise stage added; empty if it did not run, or nobody asked.
+    pub noise: Vec<[f32; 3]>,
     pub notes: Vec<String>,
     pub seconds: StageSeconds,
 }
@@ -114,6 +116,19 @@ impl Serialize for StageSeconds {
     }
 }
 
+/// As [`finish`], and keeps what the noise stage adds.
+pub fn finish_with_noise(
+    picture: Picture,
+    film: &Film,
+    scene: &Scene,
+    frame: u32,
+    motion: Option<&PictureMotion>,
+    gpu: Option<&GpuStages>,
+) -> Finished {
+    let shot = Shot::new(picture, film, scene, frame, motion);
+    shot.finish(gpu, true)
+}
+
 /// Applies the scene's stages to the composite `picture` of `film`, as frame number `frame` of a video. Without a stage the picture
 /// comes back as it is, and nothing is computed. `motion` is what the copies of motion blur go along; without it they do nothing. They run on `gpu` if there is one and it can; else on the CPU.
 pub fn finish(
@@ -124,35 +139,65 @@ pub fn finish(
     motion: Option<&PictureMotion>,
     gpu: Option<&GpuStages>,
 ) -> Finished {
-    let mut shot = Shot {
-        picture,
-        film,
-        scene,
-        frame,
-        motion,
-        changed_mask: None,
-        estimate_gain: 1.0,
-        notes: Vec::new(),
-    };
-    let mut seconds = StageSeconds::default();
-    for (stage, seconds) in STAGES.iter().zip(&mut seconds.0) {
-        if !(stage.wants)(&shot) {
-            continue;
+    let shot = Shot::new(picture, film, scene, frame, motion);
+    shot.finish(gpu, false)
+}
+
+impl<'a> Shot<'a> {
+    fn new(
+        picture: Picture,
+        film: &'a Film,
+        scene: &'a Scene,
+        frame: u32,
+        motion: Option<&'a PictureMotion>,
+    ) -> Self {
+        Self {
+            picture,
+            film,
+            scene,
+            frame,
+            motion,
+            changed_mask: None,
+            estimate_gain: 1.0,
+            notes: Vec::new(),
         }
-        let begin = Instant::now();
+    }
+
+    fn finish(mut self, gpu: Option<&GpuStages>, keeps_noise: bool) -> Finished {
+        let mut seconds = StageSeconds::default();
+        let mut noise = Vec::new();
+        for (stage, seconds) in STAGES.iter().zip(&mut seconds.0) {
+            if !(stage.wants)(&self) {
+                continue;
+            }
+            let keeps = keeps_noise && stage.name == "noise";
+            let before = keeps.then(|| self.picture.linear.clone());
+            let begin = Instant::now();
+            self.run(stage, gpu);
+            *seconds = begin.elapsed().as_secs_f64();
+            if let Some(before) = before {
+                let pixels = self.picture.linear.iter().zip(before);
+                noise = pixels
+                    .map(|(with, without)| std::array::from_fn(|c| with[c] - without[c]))
+                    .collect();
+            }
+        }
+        Finished {
+            picture: self.picture,
+            noise,
+            notes: self.notes,
+            seconds,
+        }
+    }
+
+    fn run(&mut self, stage: &Stage, gpu: Option<&GpuStages>) {
         for device in [gpu, None] {
-            match (stage.run)(&mut shot, device) {
+            match (stage.run)(self, device) {
                 Ok(()) => break,
-                Err(error) => shot.notes.push(format!(
+                Err(error) => self.notes.push(format!(
                     "a stage runs on the CPU, for the GPU cannot: {error}"
                 )),
             }
         }
-        *seconds = begin.elapsed().as_secs_f64();
-    }
-    Finished {
-        picture: shot.picture,
-        notes: shot.notes,
-        seconds,
     }
 }

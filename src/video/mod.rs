@@ -1,5 +1,6 @@
 //! Frames of a video in and out: folders of pictures, Y4M streams, and runs of JPEG pictures as webcams write them.
 
+mod frame_output;
 mod matrix;
 mod sink;
 mod source;
@@ -7,6 +8,7 @@ mod y4m;
 mod y4m_file;
 mod yuv;
 
+pub use frame_output::{FrameOutput, Pattern, Pictures};
 pub use matrix::Matrix;
 pub use sink::{FrameSink, SinkPlan, sequence_note};
 pub use source::{FrameRange, FrameSource, Pixels, Taken, VideoFrame};
@@ -88,11 +90,9 @@ fn foreign(path: &Path, mark: &str) -> VideoError {
     )
 }
 
-/// Fingerprints had 16 digits once.
+/// Fingerprints had 16 digits once, and films had them in their headers.
 fn has_earlier_fingerprint(mark: &str) -> bool {
-    let fingerprint = ["\"fingerprint\": \"", " XMIXRAY="]
-        .iter()
-        .find_map(|before| Some(mark.split_once(before)?.1));
     let digits = |rest: &str| rest.chars().take_while(char::is_ascii_hexdigit).count();
-    fingerprint.is_some_and(|rest| digits(rest) == 16)
+    let in_note = mark.split_once("\"fingerprint\": \"");
+    in_note.is_some_and(|(_, rest)| digits(rest) == 16) || mark.contains(" XMIXRAY=")
 }

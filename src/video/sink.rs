@@ -1,45 +1,48 @@
-//! Where frames go: a folder of PNG files, a Y4M file, or a Y4M stream on standard output.
+//! Writes frames: PNG or EXR files, a Y4M file, or a Y4M stream on standard output.
 //!
-//! What is finished stays: a PNG file is written beside its place and renamed, a Y4M file grows under another name until it is whole.
-//! Both carry a fingerprint of the render, so that one that goes on after an interruption takes no other's frames for its own. What a
-//! power cut or a bad disk has damaged does not count as finished.
+//! What is finished stays: a picture is written beside its place and renamed, a Y4M file grows under another name until it is whole.
+//! A note beside them has a fingerprint of the render, so that one that goes on after an interruption takes no other's frames for its own.
+//! What a power cut or a bad disk has damaged does not count as finished.
 
 use std::collections::HashSet;
-use std::ffi::{OsStr, OsString};
-use std::io::{BufWriter, Write};
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
+use super::frame_output::{FOLDER_NOTE, FrameOutput, Pictures};
 use super::y4m::{GREY, Header};
 use super::y4m_file::{Paths, Y4mFile, write_frame};
 use super::yuv::encode_yuv;
 use super::{Pixels, Place, VideoError, VideoFrame, cannot_write, foreign};
-use crate::files::{self, final_target};
+use crate::files;
 use crate::film::Picture;
 use crate::output::{
-    Format, OutputError, PNG_END, PngBits, Target, check_named, check_writable, cut,
-    picture_codes8, remove_leftovers, write_bytes, write_png, write_text,
+    ExrLayers, ExrPicture, Format, OutputError, PNG_END, PngBits, Target, check_named,
+    check_writable, cut, is_sealed, picture_codes8, remove_leftovers, write_bytes, write_exr,
+    write_png, write_text,
 };
 use crate::scene::trajectory::FrameName;
-use crate::scene::{EncodedPhoto, Photo};
-
-/// The note in a folder of frames.
-const NOTE: &str = "mixray-sequence.json";
+use crate::scene::{Composite, EncodedPhoto, Photo};
 
 /// The note of a render in its folder: its name, and what it says.
 pub fn sequence_note(fingerprint: &str) -> (&'static str, String) {
-    let text = format!("{{\n  \"fingerprint\": \"{fingerprint}\"\n}}\n");
-    (NOTE, text)
+    (FOLDER_NOTE, note_text(fingerprint))
 }
 
 /// What a sink has to know before the first frame.
 pub struct SinkPlan<'a> {
-    /// A folder, a file that ends in .y4m, or `-`.
+    /// As it was named, for messages.
     pub path: &'a Path,
+    pub output: FrameOutput,
     /// Of everything that the frames depend on.
     pub fingerprint: String,
     /// Of the frames' size; a Y4M source's own.
     pub header: Header,
     pub png_bits: Option<PngBits>,
+    /// Of EXR files.
+    pub layers: ExrLayers,
+    pub composite: Composite,
     /// Frames of another render are replaced.
     pub overwrite: bool,
     /// The frames to come, where they are known.
@@ -49,13 +52,15 @@ pub struct SinkPlan<'a> {
 pub struct FrameSink {
     kind: Kind,
     png_bits: Option<PngBits>,
+    layers: ExrLayers,
+    composite: Composite,
     header: Header,
     /// Planes of the last frame of a film that this run has written.
     last: Vec<u8>,
 }
 
 enum Kind {
-    Folder(PathBuf),
+    Pictures(Pictures),
     Y4mFile(Y4mFile),
     Stdout(BufWriter<std::io::Stdout>),
 }
@@ -64,20 +69,25 @@ impl FrameSink {
     /// # Errors
     /// It cannot be written, holds frames of another render, or files that are read.
     pub fn open(plan: SinkPlan<'_>) -> Result<Self, VideoError> {
-        let kind = if plan.path == Path::new("-") {
-            let mut out = BufWriter::new(std::io::stdout());
-            let header = format!("{}\n", plan.header.line);
-            let sent = out.write_all(header.as_bytes());
-            sent.map_err(|error| Place::Stdout.error(cannot_write(&error)))?;
-            Kind::Stdout(out)
-        } else if plan.path.extension().is_some_and(|e| e == "y4m") {
-            Kind::Y4mFile(open_y4m(&plan)?)
-        } else {
-            Kind::Folder(open_folder(&plan)?)
+        let kind = match &plan.output {
+            FrameOutput::Stdout => {
+                let mut out = BufWriter::new(std::io::stdout());
+                let header = format!("{}\n", plan.header.line);
+                let sent = out.write_all(header.as_bytes());
+                sent.map_err(|error| Place::Stdout.error(cannot_write(&error)))?;
+                Kind::Stdout(out)
+            }
+            FrameOutput::Y4m(path) => Kind::Y4mFile(open_y4m(&plan, path)?),
+            FrameOutput::Pictures(pictures) => {
+                open_folder(&plan, pictures)?;
+                Kind::Pictures(pictures.clone())
+            }
         };
         Ok(Self {
             kind,
             png_bits: plan.png_bits,
+            layers: plan.layers,
+            composite: plan.composite,
             header: plan.header,
             last: Vec::new(),
         })
@@ -85,7 +95,7 @@ impl FrameSink {
 
     /// The colours of a film; `None`: pictures are written.
     pub fn film_colours(&self) -> Option<String> {
-        (!matches!(self.kind, Kind::Folder(_))).then(|| self.header.colours())
+        (!matches!(self.kind, Kind::Pictures(_))).then(|| self.header.colours())
     }
 
     /// The frame, the next in order, is finished from an earlier run, and whole. Asked once for each, before it is written; `frame` is what
@@ -95,14 +105,34 @@ impl FrameSink {
     /// Its file is one that is read, or that of another frame.
     pub fn has(&mut self, name: &FrameName, frame: &VideoFrame) -> Result<bool, VideoError> {
         match &mut self.kind {
-            Kind::Folder(folder) => {
-                let path = png_path(folder, name);
+            Kind::Pictures(pictures) => {
+                let path = pictures.file_of(name);
                 check_named(&path)?;
-                Ok(is_whole(&path, frame))
+                Ok(is_whole(&path, pictures.format, frame))
             }
             Kind::Y4mFile(file) => file.has_next(),
             Kind::Stdout(_) => Ok(false),
         }
+    }
+
+    /// The layers of EXR files, which [`FrameSink::write_exr`] writes; `None`: frames are pictures alone.
+    pub fn layers(&self) -> Option<&ExrLayers> {
+        match &self.kind {
+            Kind::Pictures(pictures) if pictures.format == Format::Exr => Some(&self.layers),
+            _ => None,
+        }
+    }
+
+    /// Writes a frame as an EXR file.
+    ///
+    /// # Errors
+    /// The disk refuses.
+    pub fn write_exr(&mut self, name: &FrameName, exr: &ExrPicture) -> Result<(), VideoError> {
+        if let Kind::Pictures(pictures) = &self.kind {
+            let target = Target::named(&pictures.file_of(name), Format::Exr);
+            write_exr(&target, exr)?;
+        }
+        Ok(())
     }
 
     /// Writes a frame whose photograph is `frame`'s.
@@ -115,8 +145,8 @@ impl FrameSink {
         picture: &Picture,
         frame: &VideoFrame,
     ) -> Result<(), VideoError> {
-        if let Kind::Folder(folder) = &self.kind {
-            let target = Target::named(&png_path(folder, name), Format::Png);
+        if let Kind::Pictures(pictures) = &self.kind {
+            let target = Target::named(&pictures.file_of(name), Format::Png);
             let photo = Some(&frame.photo);
             let bits = self.png_bits.unwrap_or_else(|| PngBits::for_photo(photo));
             return Ok(write_png(&target, picture, photo, bits)?);
@@ -139,8 +169,12 @@ impl FrameSink {
     /// # Errors
     /// As [`FrameSink::write`].
     pub fn pass(&mut self, name: &FrameName, frame: &VideoFrame) -> Result<(), VideoError> {
+        if self.layers().is_some() {
+            let exr = ExrPicture::untouched(&frame.photo, self.composite, &self.layers);
+            return self.write_exr(name, &exr);
+        }
         match (&self.kind, &frame.pixels) {
-            (Kind::Folder(folder), Pixels::File(path))
+            (Kind::Pictures(pictures), Pixels::File(path))
                 if path
                     .extension()
                     .is_some_and(|e| e.eq_ignore_ascii_case("png")) =>
@@ -151,7 +185,7 @@ impl FrameSink {
                         "it cannot be read ({error}); expected a picture; check the disk"
                     ),
                 })?;
-                Ok(write_bytes(&png_path(folder, name), &bytes)?)
+                Ok(write_bytes(&pictures.file_of(name), &bytes)?)
             }
             (Kind::Y4mFile(_) | Kind::Stdout(_), Pixels::Planes(planes)) => {
                 self.write_planes(planes)
@@ -175,7 +209,7 @@ impl FrameSink {
     /// As [`FrameSink::write`].
     pub fn repeat(&mut self) -> Result<bool, VideoError> {
         let is_there = match &mut self.kind {
-            Kind::Folder(_) => return Ok(false),
+            Kind::Pictures(_) => return Ok(false),
             Kind::Y4mFile(file) => file.has_next()?,
             Kind::Stdout(_) => false,
         };
@@ -194,7 +228,7 @@ impl FrameSink {
             Kind::Stdout(out) => {
                 write_frame(out, planes).map_err(|error| Place::Stdout.error(cannot_write(&error)))
             }
-            Kind::Folder(_) => Ok(()),
+            Kind::Pictures(_) => Ok(()),
         }
     }
 
@@ -205,58 +239,53 @@ impl FrameSink {
     pub fn finish(self) -> Result<(), VideoError> {
         match self.kind {
             Kind::Y4mFile(file) => file.finish(),
-            Kind::Folder(_) | Kind::Stdout(_) => Ok(()),
+            Kind::Pictures(_) | Kind::Stdout(_) => Ok(()),
         }
     }
 }
 
-fn png_path(folder: &Path, name: &FrameName) -> PathBuf {
-    let stem = match &name.file {
-        Some(file) => Path::new(file)
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned(),
-        None => format!("frame_{:06}", name.number),
-    };
-    folder.join(format!("{stem}.png"))
+/// What stands beside the frames.
+fn note_text(fingerprint: &str) -> String {
+    format!("{{\n  \"fingerprint\": \"{fingerprint}\"\n}}\n")
 }
 
-/// The folder, links resolved.
-fn open_folder(plan: &SinkPlan<'_>) -> Result<PathBuf, VideoError> {
-    let folder = final_target(plan.path);
+fn open_folder(plan: &SinkPlan<'_>, pictures: &Pictures) -> Result<(), VideoError> {
+    let folder = &pictures.folder;
     let place = Place::File(plan.path.into());
-    files::output(plan.path).map_err(OutputError::from)?;
-    for name in &plan.names {
-        files::check_output(&png_path(&folder, name)).map_err(OutputError::from)?;
+    // Of a pattern the folder may hold anything.
+    if pictures.pattern.is_none() {
+        files::output(plan.path).map_err(OutputError::from)?;
     }
-    std::fs::create_dir_all(&folder).map_err(|error| {
+    for name in &plan.names {
+        files::check_output(&pictures.file_of(name)).map_err(OutputError::from)?;
+    }
+    std::fs::create_dir_all(folder).map_err(|error| {
         place.error(format!("it cannot be made ({error}); expected a folder for the frames, a file that ends in .y4m, or -; name another"))
     })?;
-    let note_path = folder.join(NOTE);
+    let note_path = pictures.note();
     check_writable(&note_path)?;
     let own: HashSet<OsString> = (plan.names.iter())
-        .filter_map(|name| Some(cut(png_path(&folder, name).file_name()?)))
+        .filter_map(|name| Some(cut(pictures.file_of(name).file_name()?)))
         .collect();
-    remove_leftovers(&folder, |output| match own.is_empty() {
-        true => is_numbered(output),
+    remove_leftovers(folder, |output| match own.is_empty() {
+        true => pictures.is_numbered(output),
         false => own.contains(output),
     });
-    let (_, note) = sequence_note(&plan.fingerprint);
+    let note = note_text(&plan.fingerprint);
     let found = std::fs::read_to_string(&note_path).unwrap_or_default();
     if found == note {
-        return Ok(folder);
+        return Ok(());
     }
-    let entries = std::fs::read_dir(&folder).map_err(|error| place.error(cannot_write(&error)))?;
+    let entries = std::fs::read_dir(folder).map_err(|error| place.error(cannot_write(&error)))?;
     let others: Vec<PathBuf> = entries
         .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.extension().is_some_and(|e| e == "png"))
+        .filter(|path| pictures.may_be_frame(path))
         .collect();
     if !others.is_empty() {
         // Another run of the same render may have begun since: its note is there before its first frame.
         let found = std::fs::read_to_string(&note_path).unwrap_or_default();
         if found == note {
-            return Ok(folder);
+            return Ok(());
         }
         if !plan.overwrite {
             return Err(foreign(plan.path, &found));
@@ -269,47 +298,73 @@ fn open_folder(plan: &SinkPlan<'_>) -> Result<PathBuf, VideoError> {
         std::fs::remove_file(&path)
             .map_err(|error| Place::File(path).error(cannot_write(&error)))?;
     }
-    write_text(&note_path, &note)?;
-    Ok(folder)
-}
-
-/// What a frame without a name of its own is called.
-fn is_numbered(name: &OsStr) -> bool {
-    let number = (name.to_str())
-        .and_then(|name| name.strip_prefix("frame_")?.strip_suffix(".png"))
-        .and_then(|number| number.parse().ok());
-    number.is_some_and(|number: u32| *name == *format!("frame_{number:06}.png"))
+    Ok(write_text(&note_path, &note)?)
 }
 
 /// A picture of the frame's size to its last byte, or the frame's own file.
-fn is_whole(path: &Path, frame: &VideoFrame) -> bool {
+fn is_whole(path: &Path, format: Format, frame: &VideoFrame) -> bool {
     let Ok(bytes) = std::fs::read(path) else {
         return false;
     };
     let is_own = |own: &PathBuf| std::fs::read(own).is_ok_and(|own| own == bytes);
-    if matches!(&frame.pixels, Pixels::File(own) if is_own(own)) {
+    if format == Format::Png && matches!(&frame.pixels, Pixels::File(own) if is_own(own)) {
         return true;
     }
-    bytes.ends_with(&PNG_END)
+    let is_to_its_end = match format {
+        Format::Png => bytes.ends_with(&PNG_END),
+        Format::Exr => is_sealed(&bytes),
+    };
+    is_to_its_end
         && Photo::decode(&bytes).is_ok_and(|(photo, _)| {
             (photo.width, photo.height) == (frame.photo.width, frame.photo.height)
         })
 }
 
-fn open_y4m(plan: &SinkPlan<'_>) -> Result<Y4mFile, VideoError> {
-    let path = final_target(plan.path);
-    let part = path.with_extension("y4m.part");
+fn open_y4m(plan: &SinkPlan<'_>, path: &Path) -> Result<Y4mFile, VideoError> {
+    let beside = |extension: &str| path.with_extension(extension);
+    let (part, note_path) = (beside("y4m.part"), beside("y4m.mixray-sequence.json"));
     check_writable(plan.path)?;
     check_writable(&part)?;
-    // The fingerprint stands in the header, where other programs pass it by.
-    let line = format!("{} XMIXRAY={}", plan.header.line, plan.fingerprint);
+    check_writable(&note_path)?;
+    let note = note_text(&plan.fingerprint);
+    let found = std::fs::read_to_string(&note_path).unwrap_or_default();
+    let is_ours = found == note;
+    let holds = |path: &Path| path.metadata().is_ok_and(|file| file.len() > 0);
+    if !is_ours && !plan.overwrite {
+        for there in [path, &part] {
+            if holds(there) {
+                return Err(foreign(plan.path, &(found + &begin_of(there))));
+            }
+        }
+    }
+    // The whole file of another render goes before the note says that what is there is of this one.
+    let claim = || {
+        if path.exists() {
+            files::before_write(path).map_err(OutputError::from)?;
+            std::fs::remove_file(path)
+                .map_err(|error| Place::File(path.into()).error(cannot_write(&error)))?;
+        }
+        Ok(write_text(&note_path, &note)?)
+    };
     Y4mFile::open(
-        Paths { path, part },
-        &line,
+        Paths {
+            path: path.into(),
+            part: part.clone(),
+        },
+        &plan.header.line,
         plan.header.frame_bytes(),
         plan.names.len() as u32,
-        plan.overwrite,
+        (plan.overwrite || !is_ours).then_some(&claim),
     )
+}
+
+/// What a film says of itself.
+fn begin_of(path: &Path) -> String {
+    let mut begin = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(256).read_to_end(&mut begin));
+    // Only for a better message.
+    let _ = read;
+    String::from_utf8_lossy(&begin).into_owned()
 }
 
 #[cfg(test)]

@@ -117,6 +117,15 @@ impl FrameSource {
         }
     }
 
+    /// Reads a stream on standard input to its end: the program that writes it is not cut off by a pipe that closes. `is_cancelled` ends it.
+    pub fn drain(&mut self, is_cancelled: &dyn Fn() -> bool) {
+        if let Kind::Y4m(reader) = &mut self.kind
+            && *reader.place() == Place::Stdin
+        {
+            reader.drain(is_cancelled);
+        }
+    }
+
     /// All frames, where they are known before they are read.
     pub fn names(&self) -> Option<Vec<FrameName>> {
         match &self.kind {

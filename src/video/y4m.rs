@@ -129,7 +129,7 @@ impl Header {
             full_range,
             matrix: Matrix::of_height(height),
             rate,
-            line: line.to_owned(),
+            line: without_mark(line),
         })
     }
 
@@ -154,6 +154,17 @@ impl Header {
     pub fn frame_bytes(&self) -> usize {
         let (w, h) = self.chroma_size();
         self.width as usize * self.height as usize + 2 * (w as usize * h as usize)
+    }
+}
+
+/// Films of earlier versions of this program have a fingerprint in their header, which other programs take for one that is too long.
+fn without_mark(line: &str) -> String {
+    match line.contains(" XMIXRAY=") {
+        true => {
+            let words = line.split(' ').filter(|word| !word.starts_with("XMIXRAY="));
+            words.collect::<Vec<_>>().join(" ")
+        }
+        false => line.to_owned(),
     }
 }
 
@@ -226,6 +237,12 @@ impl<R: Read> Y4mReader<R> {
 
     pub(crate) fn set_matrix(&mut self, matrix: Matrix) {
         self.header.matrix = matrix;
+    }
+
+    /// Reads on to the end, so that whoever writes the stream is not cut off, unless `is_cancelled`.
+    pub(crate) fn drain(&mut self, is_cancelled: &dyn Fn() -> bool) {
+        let mut buffer = vec![0; 1 << 16];
+        while !is_cancelled() && matches!(self.input.read(&mut buffer), Ok(1..)) {}
     }
 
     pub(crate) fn place(&self) -> &Place {

@@ -32,13 +32,14 @@ pub(super) struct Y4mFile {
 }
 
 impl Y4mFile {
-    /// `count`: of the frames to come, 0 where it is not known.
+    /// `count`: of the frames to come, 0 where it is not known; `claim`: nothing that is there is of this render, and this makes it so. It is
+    /// called when no other run writes here.
     pub(super) fn open(
         paths: Paths,
         line: &str,
         planes_bytes: usize,
         count: u32,
-        overwrite: bool,
+        claim: Option<&dyn Fn() -> Result<(), VideoError>>,
     ) -> Result<Self, VideoError> {
         let frame_bytes = (MARKER.len() + planes_bytes) as u64;
         let mut file = Self {
@@ -49,7 +50,7 @@ impl Y4mFile {
             asked: 0,
             part: None,
         };
-        if !overwrite
+        if claim.is_none()
             && file.paths.path.exists()
             && let Some(there) = file.look(&file.paths.path)?
         {
@@ -62,7 +63,7 @@ impl Y4mFile {
                 return Ok(file);
             }
         }
-        file.open_part(overwrite)?;
+        file.open_part(claim)?;
         Ok(file)
     }
 
@@ -107,10 +108,13 @@ impl Y4mFile {
         let Paths { path, part } = &self.paths;
         std::fs::rename(path, part)
             .map_err(|error| Place::File(path.clone()).error(cannot_write(&error)))?;
-        self.open_part(false)
+        self.open_part(None)
     }
 
-    fn open_part(&mut self, overwrite: bool) -> Result<(), VideoError> {
+    fn open_part(
+        &mut self,
+        claim: Option<&dyn Fn() -> Result<(), VideoError>>,
+    ) -> Result<(), VideoError> {
         let part = self.paths.part.clone();
         let failed = |error: io::Error| Place::File(part.clone()).error(cannot_write(&error));
         let mut file = (File::options().read(true).write(true))
@@ -123,9 +127,13 @@ impl Y4mFile {
                 "another run writes it; expected it for this one alone; wait for the other, or name another output",
             ));
         }
-        let there = match overwrite {
-            true => None,
-            false => self.look(&part)?,
+        let there = match claim {
+            Some(claim) => {
+                file.set_len(0).map_err(failed)?;
+                claim()?;
+                None
+            }
+            None => self.look(&part)?,
         };
         self.there = there.as_ref().map_or(0, |there| there.count);
         let line = format!("{}\n", self.line);

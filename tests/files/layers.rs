@@ -49,13 +49,7 @@ fn exr_layers() {
     assert_eq!(
         usual,
         [
-            "",
-            "depth",
-            "difference",
-            "mask",
-            "normal",
-            "samples",
-            "variance"
+            "", "change", "depth", "mask", "normal", "samples", "variance", "virtual"
         ]
     );
     folder.succeed("render scene.toml -o out.png --stats s.json");
@@ -74,9 +68,9 @@ fn exr_layers() {
     assert!(
         render(&folder, "--composite quotient")
             .0
-            .contains(&"real".to_owned())
+            .contains(&"ratio".to_owned())
     );
     let refused = folder.run("render scene.toml -o out.exr --layers beauty");
     assert_eq!(refused.status.code(), Some(2));
-    assert!(stderr(&refused).contains("expected composite, difference"));
+    assert!(stderr(&refused).contains("expected composite, virtual"));
 }

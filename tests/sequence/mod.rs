@@ -6,6 +6,7 @@ mod copies;
 mod errors;
 mod flicker;
 mod frames;
+mod outputs;
 mod ranges;
 mod resume;
 pub mod support;

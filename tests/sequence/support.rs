@@ -99,7 +99,7 @@ pub fn frames_of(folder: &Path) -> Vec<(String, Vec<u8>)> {
         .map(|entries| {
             entries
                 .map(|entry| entry.expect("reads").path())
-                .filter(|path| path.extension().is_some_and(|e| e == "png"))
+                .filter(|path| path.extension().is_some_and(|e| e == "png" || e == "exr"))
                 .map(|path| {
                     let name = path
                         .file_name()

@@ -22,7 +22,7 @@ fn noisy(folder: &Folder, name: &str, level: f64, sigma: f64, seed: u64) {
     });
 }
 
-fn layers(folder: &Folder) {
+pub fn layers(folder: &Folder) {
     noisy(folder, "photo.png", 100.0, 3.0, 1);
     folder.save("layer.png", 64, 48, |_, _| [180; 3]);
     folder.save("mask.png", 64, 48, |x, _| [if x < 32 { 0 } else { 255 }; 3]);
@@ -82,7 +82,7 @@ fn calibrate_writes_a_profile_that_apply_uses() {
 }
 
 /// Channels of 64 x 48 pixels in one OpenEXR file.
-fn save_exr(folder: &Folder, name: &str, channels: &[(&str, &dyn Fn(usize) -> f32)]) {
+pub fn save_exr(folder: &Folder, name: &str, channels: &[(&str, &dyn Fn(usize) -> f32)]) {
     let list = channels.iter().map(|(name, value)| {
         let samples = (0..64 * 48).map(|i| value(i % 64)).collect();
         exr::AnyChannel::new(*name, exr::FlatSamples::F32(samples))
@@ -262,7 +262,7 @@ fn inputs_are_never_overwritten() {
     refused(&apply, "photo.png", read);
     for frames in ["f0.png f1.png f2.png", "."] {
         let calibrate = format!("noise calibrate {frames} -o f0.png");
-        refused(&calibrate, "f0.png", read);
+        refused(&calibrate, "f0.png", "expected .toml");
     }
     let twice = "named for two outputs";
     refused(

@@ -4,6 +4,7 @@ mod antialias;
 mod cartoon;
 mod commands;
 mod flicker;
+mod layers;
 mod noise;
 mod render;
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::bench::replace_section;
 use crate::cli::Failure;
-use crate::output::{check_writable, write_text};
+use crate::output::{check_writable_as, write_text};
 
 /// A page with a section for this table.
 pub(super) struct Docs {
@@ -15,7 +15,7 @@ pub(super) struct Docs {
 
 impl Docs {
     pub(super) fn open(path: &Path, section: &'static str) -> Result<Self, Failure> {
-        check_writable(path)?;
+        check_writable_as(path, "md")?;
         // Not as an input: the page is only read to be written again.
         let page = std::fs::read_to_string(path)
             .map_err(|error| Failure(format!("{}: {error}", path.display())))?;

@@ -11,7 +11,7 @@ use crate::cli::threads::ThreadsFlag;
 use crate::cli::values::{choice, rays_per_pixel};
 use crate::cli::{Failure, Outcome, say};
 use crate::files;
-use crate::output::remove_leftovers;
+use crate::output::{check_folder_name, remove_leftovers};
 use crate::scene::{BackendChoice, Composite, Estimator, SamplerKind, Scene};
 
 /// Where figures go, and on how many threads they are made.
@@ -40,6 +40,7 @@ impl OutputFlags {
     pub(super) fn make_folder(&self, names: &[&str]) -> Result<&Path, Failure> {
         let folder = &self.output;
         files::output(folder)?;
+        check_folder_name(folder, "a folder")?;
         for name in names {
             files::output(&folder.join(name))?;
         }

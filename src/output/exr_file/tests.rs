@@ -1,5 +1,9 @@
 use super::*;
-use exr::prelude::{ReadChannels, ReadLayers};
+use crate::film::{Parts, Picture, Planes};
+use crate::output::exr_header::is_sealed;
+use crate::output::metadata::test_support::metadata;
+use crate::scene::{Composite, Estimator, SamplerKind};
+use exr::prelude::{ReadChannels, ReadLayers, f16};
 
 fn planes() -> Planes {
     let rgb = |start: f32| (0..6).map(|i| [start, start + i as f32, -0.5]).collect();
@@ -28,28 +32,29 @@ fn every_layer_and_attribute_reads_back() {
     };
     let mut world_from_camera = glam::DMat4::from_rotation_y(0.5);
     world_from_camera.w_axis.x = 4.25;
-    let metadata = Metadata {
-        rays_per_pixel: 49,
-        max_bounces: 4,
-        seed: u32::MAX,
-        estimator: Estimator::Direct,
-        sampler: SamplerKind::Sobol,
-        scrambles: Some(16),
-        filtered: true,
-        camera: Camera {
-            width: 3,
-            height: 2,
-            fx: 520.9,
-            fy: 521.0,
-            cx: 1.5,
-            cy: 1.0,
-            distortion: crate::scene::Distortion::opencv(&[0.1, 0.0, 0.0, 0.0, -0.2])
-                .expect("five"),
-            world_from_camera,
-        },
-    };
+    let mut metadata = metadata();
+    metadata.rays_per_pixel = 49;
+    metadata.seed = u32::MAX;
+    metadata.estimator = Estimator::Direct;
+    metadata.sampler = SamplerKind::Sobol;
+    metadata.scrambles = Some(16);
+    metadata.filtered = true;
+    metadata.camera.fx = 520.9;
+    metadata.camera.distortion =
+        crate::scene::Distortion::opencv(&[0.1, 0.0, 0.0, 0.0, -0.2]).expect("five");
+    metadata.camera.world_from_camera = world_from_camera;
+    metadata.composite = Composite::Quotient;
     let planes = planes();
-    write_exr(&target, &picture, &planes, &metadata).unwrap();
+    let mut exr = ExrPicture::new(picture.clone(), planes.clone(), metadata);
+    exr.parts = Parts {
+        virtual_light: planes.real.clone(),
+        coverage: vec![0.1; 6],
+        change: planes.mixed.clone(),
+        ratio: planes.albedo.clone(),
+    };
+    exr.noise = vec![[0.25, -0.5, 1e-3]; 6];
+    exr.keeps_photo = true;
+    write_exr(&target, &exr).unwrap();
 
     let image = exr::prelude::read()
         .no_deep_data()
@@ -79,6 +84,9 @@ fn every_layer_and_attribute_reads_back() {
         ("difference.", &planes.difference),
         ("variance.", &planes.variance),
         ("albedo.", &planes.albedo),
+        ("virtual.", &exr.parts.virtual_light),
+        ("change.", &exr.parts.change),
+        ("ratio.", &exr.parts.ratio),
     ];
     for (prefix, values) in rgb {
         for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
@@ -94,12 +102,21 @@ fn every_layer_and_attribute_reads_back() {
     assert_eq!(channel("depth.Z"), planes.depth);
     assert_eq!(channel("samples.Y"), planes.samples);
     assert_ne!(channel("mixed.R"), channel("real.R"), "control");
-    assert_eq!(layer.channel_data.list.len(), 24);
+    assert_eq!(channel("virtual.A"), vec![0.1; 6]);
+    assert_eq!(channel("noise.B"), vec![f16::from_f32(1e-3).to_f32(); 6]);
+    assert_ne!(channel("noise.B"), vec![1e-3; 6], "control: 16 bits");
+    assert_eq!(layer.channel_data.list.len(), 37);
 
     let attribute = |name: &str| &layer.attributes.other[&Text::from(name)];
     let text = |s: &str| AttributeValue::Text(Text::from(s));
     assert_eq!(*attribute("mixray.estimator"), text("direct"));
     assert_eq!(*attribute("mixray.sampler"), text("sobol"));
+    assert_eq!(*attribute("mixray.composite"), text("quotient"));
+    assert_eq!(*attribute("mixray.stages"), text("none"));
+    assert_eq!(
+        *attribute("mixray.lens.apertureRadius"),
+        AttributeValue::F64(0.0)
+    );
     let variance = "of the mean of 16 independent scrambles";
     assert_eq!(*attribute("mixray.variance"), text(variance));
     let filter = "preview: the difference is smoothed, biased";
@@ -138,7 +155,7 @@ fn one_picture_is_one_file() {
             .collect();
         write_channels(&target, 3, 2, channels, attributes).unwrap();
         let file = exr::prelude::MetaData::read_from_file(target.path(), true).unwrap();
-        assert_eq!(file.headers[0].own_attributes.other.len(), 9);
+        assert_eq!(file.headers[0].own_attributes.other.len(), 10);
         std::fs::read(target.path()).unwrap()
     };
     let first = write("0.exr", 1.0);
@@ -161,26 +178,31 @@ fn planes_that_were_not_asked_for_are_left_out() {
         height: 2,
         linear: vec![[0.0; 3]; 6],
     };
-    let metadata = Metadata {
-        rays_per_pixel: 1,
-        max_bounces: 1,
-        seed: 0,
-        estimator: Estimator::Paper,
-        sampler: SamplerKind::Cmj,
-        scrambles: None,
-        filtered: false,
-        camera: Camera {
-            width: 3,
-            height: 2,
-            fx: 1.0,
-            fy: 1.0,
-            cx: 1.5,
-            cy: 1.0,
-            distortion: crate::scene::Distortion::NONE,
-            world_from_camera: glam::DMat4::IDENTITY,
-        },
-    };
-    write_exr(&target, &picture, &planes, &metadata).unwrap();
+    write_exr(&target, &ExrPicture::new(picture, planes, metadata())).unwrap();
     let file = exr::prelude::MetaData::read_from_file(target.path(), true).unwrap();
     assert_eq!(file.headers[0].channels.list.len(), 17);
+}
+
+/// No byte of a file can be lost or changed unseen.
+#[test]
+fn every_damage_to_a_file_is_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = Target::picture(&folder.path().join("a.exr")).unwrap();
+    let picture = Picture {
+        width: 3,
+        height: 2,
+        linear: vec![[0.5; 3]; 6],
+    };
+    write_exr(&target, &ExrPicture::new(picture, planes(), metadata())).unwrap();
+    let whole = std::fs::read(target.path()).unwrap();
+    assert!(is_sealed(&whole), "control");
+    for length in 0..whole.len() {
+        assert!(!is_sealed(&whole[..length]), "{length} bytes");
+    }
+    for at in 0..whole.len() {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 4;
+        assert!(!is_sealed(&bytes), "byte {at}");
+    }
+    assert!(!is_sealed(b""));
 }

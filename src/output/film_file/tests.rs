@@ -1,7 +1,8 @@
 use super::*;
 use crate::film::{Sample, Splat, group_add, guide_add, planes};
 use crate::output::film_note::tests::note;
-use crate::scene::{Camera, Composite, Estimator, SamplerKind};
+use crate::output::metadata::test_support::metadata;
+use crate::scene::Composite;
 use glam::Vec3;
 
 fn film() -> Film {
@@ -51,34 +52,8 @@ fn written(film: &Film) -> (tempfile::TempDir, Target) {
     let folder = tempfile::tempdir().unwrap();
     let target = Target::picture(&folder.path().join("a.exr")).unwrap();
     let picture = crate::film::composite(film, None, Composite::Additive);
-    let metadata = Metadata {
-        rays_per_pixel: 40,
-        max_bounces: 3,
-        seed: 1,
-        estimator: Estimator::Paper,
-        sampler: SamplerKind::Cmj,
-        scrambles: None,
-        filtered: false,
-        camera: Camera {
-            width: 3,
-            height: 2,
-            fx: 1.0,
-            fy: 1.0,
-            cx: 1.5,
-            cy: 1.0,
-            distortion: crate::scene::Distortion::NONE,
-            world_from_camera: glam::DMat4::IDENTITY,
-        },
-    };
-    write_film(
-        &target,
-        &picture,
-        &planes(film, None),
-        &metadata,
-        film,
-        &note_of(film),
-    )
-    .unwrap();
+    let exr = ExrPicture::new(picture, planes(film, None), metadata());
+    write_film(&target, &exr, film, &note_of(film)).unwrap();
     (folder, target)
 }
 

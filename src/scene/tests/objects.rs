@@ -239,7 +239,7 @@ fn the_measured_scenes() {
         // Only the scan is smoothed, and that is said.
         assert!(proxy.self_shadow_bias_m > 0.0);
         assert_eq!(helmet.self_shadow_bias_m, 0.0);
-        let noise = "proxy: has the noise of a depth camera";
+        let noise = "proxy: smoothed as a depth camera's mesh";
         let said = scene.warnings.iter().filter(|w| w.starts_with(noise));
         assert_eq!(said.count(), 1, "{:?}", scene.warnings);
     }

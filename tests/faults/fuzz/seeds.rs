@@ -7,7 +7,7 @@ use exr::prelude::{
     LayerAttributes, LineOrder, SmallVec, Vec2, WritableImage, f16,
 };
 use image::{DynamicImage, ImageFormat, RgbImage};
-use mixray::output::{FilmNote, Metadata, Target, write_film};
+use mixray::output::{ExrPicture, FilmNote, Metadata, Target, write_film};
 use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{NoiseFit, NoiseProfile, load};
 use serde_json::{Value, json};
@@ -131,11 +131,11 @@ pub fn films() -> Vec<Vec<u8>> {
         .expect("renders");
     let path = folder.path().join("film.exr");
     let note = FilmNote::new(renderer.scene(), (0, 2), renderer.without());
+    let metadata = Metadata::of(&renderer, renderer.scene().fingerprint());
+    let exr = ExrPicture::new(renderer.picture(), renderer.planes(), metadata);
     write_film(
         &Target::picture(&path).expect("a name"),
-        &renderer.picture(),
-        &renderer.planes(),
-        &Metadata::of(&renderer),
+        &exr,
         renderer.film(),
         &note,
     )
