@@ -194,7 +194,7 @@ def aperture():
     focus = ball("ball", centre=(-0.35, -0.35, 0.2), radius=0.2, color=(0.8, 0.7, 0.2))
     ball("far ball", centre=(0.9, 1.6, 0.2), radius=0.2, color=(0.7, 0.2, 0.6))
     # Small and far out of focus: it shows the aperture's shape.
-    ball("bead", centre=(0.4, -1.4, 0.75), radius=0.01, color=(0.9, 0.9, 0.9))
+    ball("bead", centre=(0.4, -1.4, 0.75), radius=0.018, color=(0.9, 0.9, 0.9))
     area = lamp("AREA", location=(1.2, -0.6, 2.4), energy=60.0, shape="RECTANGLE", size=0.8, size_y=0.5, color=(1.0, 0.9, 0.8))
     area.scale = (1.5, 0.5, 1.0)
     lamp("SPOT", location=(-1.8, -0.8, 2.0), energy=120.0, shadow_soft_size=0.0, spot_size=math.radians(50), spot_blend=0.3)

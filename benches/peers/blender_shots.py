@@ -248,7 +248,7 @@ def aperture(program, folder):
     turned = shot.scene_file.with_name("turned.toml")
     turned.write_text(convert.toml(document))
     bead = np.zeros_like(theirs["mask"])
-    bead[: bead.shape[0] // 3, bead.shape[1] // 2 :] = 1.0
+    bead[49:70, 125:153] = 1.0
     wrong = program.render(turned, "composite,mask")["mask.Y"]
     figures["bead_iou"], figures["control_bead"] = (iou(m * bead, theirs["mask"] * bead) for m in (mask, wrong))
     # The camera of a still, as a film of one frame.
