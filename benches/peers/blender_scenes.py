@@ -186,7 +186,7 @@ def camera(*, location, target, lens_mm):
 
 
 def aperture():
-    """f/1.2 with five blades, turned, a shifted sensor, a focus object; a rectangle of light that is scaled, a spot and a coloured sky."""
+    """An open aperture of three blades, turned, a shifted sensor, a focus object; a rectangle of light that is scaled, a spot and a coloured sky."""
     scene = empty_scene(samples=256)
     ground()
     box("block", centre=(-0.45, 0.5, 0.25), size=(0.5, 0.5, 0.5), color=(0.6, 0.3, 0.2), is_real=True)
@@ -194,7 +194,7 @@ def aperture():
     focus = ball("ball", centre=(-0.35, -0.35, 0.2), radius=0.2, color=(0.8, 0.7, 0.2))
     ball("far ball", centre=(0.9, 1.6, 0.2), radius=0.2, color=(0.7, 0.2, 0.6))
     # Small and far out of focus: it shows the aperture's shape.
-    ball("bead", centre=(0.4, -1.4, 0.75), radius=0.01, color=(0.9, 0.9, 0.9))
+    ball("bead", centre=(0.4, -1.4, 0.75), radius=0.012, color=(0.9, 0.9, 0.9))
     area = lamp("AREA", location=(1.2, -0.6, 2.4), energy=60.0, shape="RECTANGLE", size=0.8, size_y=0.5, color=(1.0, 0.9, 0.8))
     area.scale = (1.5, 0.5, 1.0)
     lamp("SPOT", location=(-1.8, -0.8, 2.0), energy=120.0, shadow_soft_size=0.0, spot_size=math.radians(50), spot_blend=0.3)
@@ -202,7 +202,7 @@ def aperture():
     data = seen.data
     data.shift_x, data.shift_y = 0.06, -0.04
     data.dof.use_dof, data.dof.focus_object, data.dof.aperture_fstop = True, focus, 0.4
-    data.dof.aperture_blades, data.dof.aperture_rotation = 5, math.radians(20)
+    data.dof.aperture_blades, data.dof.aperture_rotation = 3, math.radians(20)
     return scene
 
 

@@ -128,8 +128,6 @@ def export_objects(context, folder, report, *, animated):
         entry = {"name": group, "mesh": relative(path, folder)}
         if animation is not None:
             entry["animation"] = animation
-        if group == UNTEXTURED:
-            entry["albedo"] = "from-photo"
         tables["virtual" if group == VIRTUAL else "real"].append(entry)
     if animated:
         _note_shape_changes(groups[VIRTUAL], report)
