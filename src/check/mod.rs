@@ -76,6 +76,8 @@ pub fn exposure(scene: &Scene, fitted_ev: Option<f64>) -> Option<Finding> {
         true => "weak",
         false => "strong",
     };
+    // Never "-0.0".
+    let fitted_ev = (fitted_ev * 10.0).round() / 10.0 + 0.0;
     let finding = format!(
         "the light is {:.1} stops too {what} for the photograph: set exposure_ev = {fitted_ev:.1} or \"auto\" in [photo], or the strength of the lights",
         off.abs()

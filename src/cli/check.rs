@@ -7,8 +7,7 @@ use clap::Args;
 use super::scene_flags::SceneFlags;
 use super::{Failure, Outcome, print, say};
 use crate::check::{self, Extent};
-use crate::renderer::{Renderer, RendererOptions, Watcher};
-use crate::scene::BackendChoice;
+use crate::renderer::roughly_fitted_exposure_ev;
 
 /// Reads a scene and tells what in it can hardly be meant, a line each, and how to mend it
 ///
@@ -22,22 +21,12 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut scene = arguments.flags.load(&arguments.scene)?;
+    let scene = arguments.flags.load(&arguments.scene)?;
     for warning in &scene.warnings {
         say("note", warning);
     }
     let mut findings = check::scene(&scene, Extent::Still);
-    if scene.photo.is_some() {
-        scene.settings.rays_per_pixel = 1;
-        scene.settings.backend = BackendChoice::Cpu;
-        let options = RendererOptions {
-            draft: true,
-            ..RendererOptions::default()
-        };
-        let mut renderer = Renderer::new(scene, options, &Watcher::none())?;
-        let fitted_ev = renderer.fitted_exposure_ev();
-        findings.extend(check::exposure(renderer.scene(), fitted_ev));
-    }
+    findings.extend(check::exposure(&scene, roughly_fitted_exposure_ev(&scene)?));
     let text: String = (findings.iter())
         .map(|finding| format!("{finding}\n"))
         .collect();

@@ -171,7 +171,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         bar.aside(|| say_idle(saving, reason));
     }
     let mut findings = check::scene(renderer.scene(), Extent::Still);
-    let fitted_ev = renderer.fitted_exposure_ev();
+    let fitted_ev = renderer.roughly_fitted_exposure_ev();
     findings.extend(check::exposure(renderer.scene(), fitted_ev));
     bar.aside(|| {
         for finding in &findings {

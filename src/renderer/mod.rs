@@ -48,6 +48,7 @@ pub use budget::Budget;
 pub use frames::FrameEdit;
 pub use goal::{CameraNoise, ErrorGoal, Goal};
 pub use picture_motion::PreviousView;
+pub use prepare::roughly_fitted_exposure_ev;
 pub use shown::Delivered;
 pub use skips::{Skip, Without};
 pub use stats::Stats;

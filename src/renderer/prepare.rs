@@ -6,12 +6,25 @@ use super::{RenderError, Renderer, photo_albedo};
 use crate::cpu;
 use crate::film::Film;
 use crate::gpu::Changed;
-use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO};
-use crate::scene::{BackendChoice, Composite, Exposure};
+use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PackedScene};
+use crate::scene::{BackendChoice, Composite, Exposure, Scene};
 use crate::work::{Meter, Phase, Watcher};
 
 /// Share of the proxy's pixels above which a limited albedo is told.
 const MOSTLY: f64 = 0.5;
+
+/// The `exposure_ev` that "auto" would take, from a few rays; `None`: it is "auto", there is no photograph, or the camera sees no lit proxy.
+///
+/// # Errors
+/// The scene does not fit the packed form.
+pub fn roughly_fitted_exposure_ev(scene: &Scene) -> Result<Option<f64>, RenderError> {
+    let is_given = scene.settings.exposure != Exposure::Auto;
+    let Some(photo) = scene.photo.as_ref().filter(|_| is_given) else {
+        return Ok(None);
+    };
+    let mut packed = PackedScene::build(scene, &Watcher::none())?;
+    Ok(photo_albedo::roughly_fit_exposure_ev(&mut packed, photo))
+}
 
 impl Renderer {
     /// Takes up the packed scene after an edit.
@@ -101,10 +114,13 @@ impl Renderer {
         }
     }
 
-    /// The `exposure_ev` that "auto" would take, from a few rays; `None`: there is no photograph, or the camera sees no lit proxy.
-    pub fn fitted_exposure_ev(&mut self) -> Option<f64> {
+    /// [`roughly_fitted_exposure_ev`] of the scene that is rendered.
+    pub fn roughly_fitted_exposure_ev(&mut self) -> Option<f64> {
         let core = &mut self.core;
         let photo = core.scene.photo.as_ref()?;
+        if core.scene.settings.exposure == Exposure::Auto {
+            return None;
+        }
         let albedo = std::mem::take(&mut core.packed.photo_albedo);
         let ev = photo_albedo::roughly_fit_exposure_ev(&mut core.packed, photo);
         core.packed.photo_albedo = albedo;

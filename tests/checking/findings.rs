@@ -27,15 +27,18 @@ fn wrong() -> Vec<(&'static str, String)> {
         good.replace(from, to)
     };
     let lamp = "[[light]]\nkind = \"quad\"\ncorner = [0, 2, 0]\nedge_u = [EDGE, 0, 0]\nedge_v = [0, 0, 1]\nradiance = [9, 9, 9]\n";
-    let at_camera = "translation = [0, 1.5, 2.9]";
+    // Large enough to stand on a longer table and hold the camera.
+    let around_camera = |text: &str| {
+        let text = text.replace("scale = 0.25", "scale = 1.5");
+        let text = text.replace("translation = [0, 0.25, 0]", "translation = [0, 1.5, 2.9]");
+        text.replace("[-2, 0, 2]", "[-2, 0, 7]")
+            .replace("[0, 0, -4]", "[0, 0, -9]")
+    };
     vec![
+        ("camera-inside", around_camera(&good)),
         (
             "camera-inside",
-            ball("translation = [0, 0.25, 0]", at_camera),
-        ),
-        (
-            "camera-inside",
-            ball("[[virtual]]", "[[real]]").replace("translation = [0, 0.25, 0]", at_camera),
+            around_camera(&good.replace("[[virtual]]", "[[real]]")),
         ),
         (
             "no-light",

@@ -121,7 +121,7 @@ fn every_form_of_ply_and_obj_is_the_same_mesh() {
 #[test]
 fn damaged_meshes_are_refused_with_their_place() {
     let folder = Folder::new();
-    let mut refused = |name: &str, bytes: &[u8], part: &str| {
+    let refused = |name: &str, bytes: &[u8], part: &str| {
         folder.write(name, bytes);
         let error = proxy(&folder, name, "real").expect_err(part);
         assert!(error.contains(part), "{part}: {error}");
