@@ -40,8 +40,13 @@ pub mod accel;
 #[cfg(feature = "bench")]
 #[doc(hidden)]
 pub mod bench;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod blender;
 #[doc(hidden)]
 pub mod camera;
+#[doc(hidden)]
+pub mod check;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;
@@ -51,6 +56,9 @@ pub mod cpu;
 mod decode;
 #[doc(hidden)]
 pub mod distortion;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod farm;
 #[doc(hidden)]
 pub mod files;
 #[doc(hidden)]

@@ -3,6 +3,7 @@
 //! Read by content: a scene-like TOML file or JSON of this program, `transforms.json` of nerfstudio, COLMAP's models, KITTI's poses, TUM trajectories. Poses
 //! become world-from-camera in metres, the camera looking along its -Z with +Y up, whatever the file's own axes.
 
+mod camera_file;
 mod colmap;
 mod colmap_binary;
 mod frame_name;
@@ -19,6 +20,7 @@ mod tests;
 mod toml;
 mod tum;
 
+pub use camera_file::{CameraFile, PixelOrigin, read_camera};
 pub use frame_name::{FrameName, Naming};
 pub use intrinsics::{Focal, Intrinsics};
 pub use opencv::read_intrinsics;
