@@ -37,7 +37,7 @@ const MOST_UP_SIGMA_DEG: f64 = 2.5;
 /// An axis that leans by less from the picture's vertical, as a cosine, is that of walls, if the surface that the lines lie in faces the camera like
 /// one.
 const WALL_VERTICAL: f64 = 0.94;
-const WALL_FACES: f64 = 0.35;
+const WALL_FACES: f64 = 0.25;
 
 /// What the lines of a picture say of its camera; `None`: not enough to be sure.
 pub fn read_lines(grey: &Grey, known: Option<KnownFocal>) -> Option<Lines> {
