@@ -76,6 +76,7 @@ struct Horizon([f64; 2]);
 /// The names of the files in a scene's folder.
 const SCENE: &str = "scene.toml";
 const POSES: &str = "poses.json";
+const SKETCH: &str = "lines.png";
 const PICTURE: &str = "picture.png";
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
@@ -158,6 +159,10 @@ fn write(made: &Made, folder: &Path) -> Result<(), Failure> {
     if let Some((name, picture)) = &made.environment {
         let target = Target::named(&own(name)?, Format::Exr);
         write_image(&target, picture, PngBits::Eight)?;
+    }
+    if let Some(sketch) = &made.sketch {
+        let target = Target::named(&own(SKETCH)?, Format::Png);
+        write_image(&target, sketch, PngBits::Eight)?;
     }
     if let Some((name, bytes)) = &made.proxy {
         write_bytes(&own(name)?, bytes)?;

@@ -23,6 +23,8 @@ pub struct Made {
     pub scene_text: String,
     /// Lat-long, by its name in the scene file.
     pub environment: Option<(&'static str, Picture)>,
+    /// The lines that the camera was read from, over the photograph.
+    pub sketch: Option<Picture>,
     /// Binary glTF, by its name in the scene file.
     pub proxy: Option<(&'static str, Vec<u8>)>,
     /// Of a scan: its trajectory, and the folder of its photographs.
@@ -78,6 +80,7 @@ pub fn compose(request: &Request, name: &dyn Fn(&Path) -> String) -> Result<Made
     Ok(Made {
         scene_text: draft.text(),
         environment: picture,
+        sketch: real.sketch,
         proxy: real.surface.map(|surface| (PROXY, glb(&surface))),
         poses: (scan.as_ref().zip(frame))
             .and_then(|(scan, frame)| Some((scan.trajectory(), folder(frame)?))),

@@ -9,6 +9,7 @@ mod compose;
 mod depth;
 mod exif;
 mod light;
+mod lines;
 mod mesh;
 mod mesh_file;
 mod mirror_ball;
@@ -18,6 +19,7 @@ mod plane;
 mod real;
 mod scan;
 mod scene_text;
+mod sketch;
 mod sun;
 mod view;
 

@@ -9,8 +9,10 @@ use super::mesh::mesh_triangles;
 use super::place::RealWorld;
 use super::scan::ScanFrame;
 use super::scene_text::Proxy;
+use super::sketch::sketch;
 use super::view::View;
 use super::{Claim, Request, Scan};
+use crate::film::Picture;
 use crate::refusal::Refusal;
 use crate::scene::{Camera, Photo};
 
@@ -27,6 +29,8 @@ pub struct RealScene {
     pub surface: Option<Surface>,
     /// What models are put down on.
     pub world: RealWorld,
+    /// The lines that the camera was read from, over the photograph.
+    pub sketch: Option<Picture>,
 }
 
 impl RealScene {
@@ -38,6 +42,19 @@ impl RealScene {
         name: &dyn Fn(&Path) -> String,
     ) -> Result<Self, Refusal> {
         let view = View::of(photo, request)?;
+        let lines = view.lines.as_ref();
+        let sketch = lines.map(|lines| sketch(photo, &view.camera.value, lines));
+        Ok(Self {
+            sketch,
+            ..Self::of_view(view, request, name)?
+        })
+    }
+
+    fn of_view(
+        view: View,
+        request: &Request,
+        name: &dyn Fn(&Path) -> String,
+    ) -> Result<Self, Refusal> {
         if let Some(mesh) = &request.mesh {
             let basis = "Proxy: the mesh as given, in the axes of this scene: the camera stands above the origin.";
             return Self::of_mesh(view.camera, mesh, DMat4::IDENTITY, basis, name);
@@ -65,6 +82,7 @@ impl RealScene {
             camera: view.camera,
             proxy: Claim::new(Proxy::Ground(reach), basis),
             surface: None,
+            sketch: None,
             world: RealWorld {
                 triangles: vec![
                     [corners[0], corners[1], corners[2]],
@@ -124,6 +142,7 @@ impl RealScene {
                     .collect(),
             },
             surface: Some(surface),
+            sketch: None,
         }
     }
 
@@ -138,6 +157,7 @@ impl RealScene {
             camera,
             proxy: Claim::new(Proxy::Mesh(name(mesh), world_from_mesh), basis),
             surface: None,
+            sketch: None,
             world: RealWorld {
                 triangles: mesh_triangles(mesh, world_from_mesh)?,
             },

@@ -7,9 +7,12 @@ use glam::{DVec2, DVec3};
 use super::camera::{camera_over_ground, height_factor, horizon_of_up, up_of_horizon, up_of_pitch};
 use super::depth::DepthMap;
 use super::exif::noted_focal_length;
+use super::lines::{Grey, KnownFocal, Lines, read_lines};
 use super::plane::{Plane, ground_plane};
 use super::{Claim, Request};
+use crate::math::luminance;
 use crate::refusal::Refusal;
+use crate::scene::srgb::encode;
 use crate::scene::{Camera, Photo, projection};
 
 /// Of phones' main cameras, and of most photographs.
@@ -19,10 +22,18 @@ const GUESSED_PITCH_DEG: f64 = 20.0;
 /// At which a photograph is taken.
 const GUESSED_HEIGHT_M: f64 = 1.5;
 
-/// A camera, and what its depth map says.
+/// Longest side of the picture that lines are looked for in, pixels.
+const LINES_SIDE_PX: u32 = 1024;
+/// Standard deviations of the logarithm of a focal length that is given, and of one that the camera notes.
+const GIVEN_SIGMA: f64 = 0.005;
+const NOTED_SIGMA: f64 = 0.03;
+
+/// A camera, and what its depth map and its lines say.
 pub struct View {
     pub camera: Claim<Camera>,
     pub depth: Option<DepthMap>,
+    /// In pixels of the photograph; `None`: the lines were not needed, or say nothing.
+    pub lines: Option<Lines>,
 }
 
 impl View {
@@ -30,7 +41,12 @@ impl View {
     /// What was given contradicts itself or cannot be read.
     pub fn of(photo: &Photo, request: &Request) -> Result<Self, Refusal> {
         let size = (photo.width, photo.height);
-        let focal = focal_length(photo, request)?;
+        let known = known_focal_length(photo, request)?;
+        let lines = match request.horizon {
+            Some(_) if known.is_some() => None,
+            _ => lines_of(photo, known.as_ref().map(|(_, known)| *known)),
+        };
+        let focal = focal_length(photo, known, lines.as_ref());
         let depth = match &request.depth {
             Some(path) => Some(read_depth(path, request)?),
             None => None,
@@ -39,7 +55,7 @@ impl View {
             let level = camera_over_ground(size, focal.value, DVec3::Y, 0.0);
             ground_plane(&depth.surface(&level).positions)
         });
-        let up = direction_up(size, focal.value, plane, request)?;
+        let up = direction_up(size, focal.value, plane, lines.as_ref(), request);
         let relative = depth.as_ref().is_some_and(|depth| depth.unit.is_relative());
         let ground = plane.map(|plane| (-plane.offset_m, relative));
         let (camera, height, factor) = with_height(size, focal.value, up.value, ground, request)?;
@@ -60,8 +76,39 @@ impl View {
         Ok(Self {
             camera: Claim::new(camera, basis),
             depth,
+            lines,
         })
     }
+}
+
+/// Lines are looked for in means of blocks of the pixels' codes.
+fn lines_of(photo: &Photo, known: Option<KnownFocal>) -> Option<Lines> {
+    let block = photo.width.max(photo.height).div_ceil(LINES_SIDE_PX) as usize;
+    let (width, height) = (photo.width as usize / block, photo.height as usize / block);
+    let codes = (0..width * height).map(|i| {
+        let (x, y) = (i % width * block, i / width * block);
+        let rows = (y..y + block)
+            .flat_map(|row| photo.linear[row * photo.width as usize + x..][..block].iter());
+        let sum: f32 = rows.map(|pixel| luminance((*pixel).into())).sum();
+        255.0 * encode(f64::from(sum) / (block * block) as f64) as f32
+    });
+    let grey = Grey {
+        width,
+        height,
+        codes: codes.collect(),
+    };
+    let scale = block as f64;
+    let known = known.map(|known| KnownFocal {
+        focal_px: known.focal_px / scale,
+        ..known
+    });
+    let mut lines = read_lines(&grey, known)?;
+    lines.focal_px *= scale;
+    for (segment, _) in &mut lines.segments {
+        segment.from *= scale;
+        segment.to *= scale;
+    }
+    Some(lines)
 }
 
 fn read_depth(path: &Path, request: &Request) -> Result<DepthMap, Refusal> {
@@ -69,34 +116,71 @@ fn read_depth(path: &Path, request: &Request) -> Result<DepthMap, Refusal> {
         .map_err(|problem| format!("{}: {problem}", path.display()).into())
 }
 
-fn focal_length(photo: &Photo, request: &Request) -> Result<Claim<f64>, Refusal> {
-    let (width, height) = (f64::from(photo.width), f64::from(photo.height));
-    let of_fov = |fov: f64, side: f64| 0.5 * side / (0.5 * fov.to_radians()).tan();
+/// What the user or the camera says.
+fn known_focal_length(
+    photo: &Photo,
+    request: &Request,
+) -> Result<Option<(Claim<f64>, KnownFocal)>, Refusal> {
     if let Some(fov) = request.fov_deg {
-        return Ok(Claim::new(
-            of_fov(fov, width),
+        let focal_px = of_field_of_view(fov, photo.width);
+        let claim = Claim::new(
+            focal_px,
             format!("{fov} degrees across the width, as given"),
-        ));
+        );
+        let sigma = GIVEN_SIGMA;
+        return Ok(Some((claim, KnownFocal { focal_px, sigma })));
     }
     let noted = noted_focal_length(&request.photo, (photo.width, photo.height))
         .map_err(|problem| format!("{}: {problem}", request.photo.display()))?;
-    Ok(noted.unwrap_or_else(|| {
-        let basis = format!(
-            "guessed, {GUESSED_FOV_DEG} degrees across the longer side, as of phones: may be off by a third; give --fov"
-        );
-        Claim::new(of_fov(GUESSED_FOV_DEG, width.max(height)), basis)
+    Ok(noted.map(|claim| {
+        let known = KnownFocal {
+            focal_px: claim.value,
+            sigma: NOTED_SIGMA,
+        };
+        (claim, known)
     }))
+}
+
+fn of_field_of_view(degrees: f64, side: u32) -> f64 {
+    0.5 * f64::from(side) / (0.5 * degrees.to_radians()).tan()
+}
+
+fn focal_length(
+    photo: &Photo,
+    known: Option<(Claim<f64>, KnownFocal)>,
+    lines: Option<&Lines>,
+) -> Claim<f64> {
+    match (known, lines) {
+        (Some((claim, _)), _) => claim,
+        (None, Some(lines)) => {
+            let basis = format!(
+                "from straight lines at right angles (drawn in lines.png, {:.2} standard deviations rms off): {:.0} pixels +- {:.1}%",
+                lines.rms,
+                lines.focal_px,
+                100.0 * lines.focal_sigma
+            );
+            Claim::new(lines.focal_px, basis)
+        }
+        (None, None) => {
+            let basis = format!(
+                "guessed, {GUESSED_FOV_DEG} degrees across the longer side, as of phones: may be off by a third; give --fov"
+            );
+            let side = photo.width.max(photo.height);
+            Claim::new(of_field_of_view(GUESSED_FOV_DEG, side), basis)
+        }
+    }
 }
 
 fn direction_up(
     size: (u32, u32),
     focal_px: f64,
     plane: Option<Plane>,
+    lines: Option<&Lines>,
     request: &Request,
-) -> Result<Claim<DVec3>, Refusal> {
+) -> Claim<DVec3> {
     if let Some([left, right]) = request.horizon {
         let up = up_of_horizon(size, focal_px, left, right);
-        return Ok(Claim::new(up, "from the horizon as given"));
+        return Claim::new(up, "from the horizon as given");
     }
     if let Some(plane) = plane {
         let basis = format!(
@@ -104,12 +188,19 @@ fn direction_up(
             100.0 * plane.support,
             1000.0 * plane.rms_m
         );
-        return Ok(Claim::new(plane.normal, basis));
+        return Claim::new(plane.normal, basis);
+    }
+    if let Some(lines) = lines {
+        let basis = format!(
+            "from straight lines (drawn in lines.png): +- {:.1} degrees, if what they are taken for is level; else give --horizon",
+            lines.up_sigma_deg
+        );
+        return Claim::new(lines.up, basis);
     }
     let basis = format!(
         "guessed, {GUESSED_PITCH_DEG} degrees down and not rolled: may be off by 15 degrees; give --horizon"
     );
-    Ok(Claim::new(up_of_pitch(GUESSED_PITCH_DEG), basis))
+    Claim::new(up_of_pitch(GUESSED_PITCH_DEG), basis)
 }
 
 /// The camera, what is said of its height, and the factor that a depth map's scale takes. `ground` is how high the camera is over the depth

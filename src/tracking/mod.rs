@@ -42,6 +42,8 @@ mod tracker;
 
 pub use board::{Board, BoardKind, Flatness};
 pub use board_file::{family_named, read_board};
+#[cfg(feature = "start")]
+pub(crate) use canvas::Canvas;
 pub use choice::Choice;
 pub use detector::{Detector, FrameSeen};
 pub use family::{FAMILIES, Family};

@@ -18,9 +18,6 @@ pub struct Segment {
     pub to: DVec2,
 }
 
-/// Codes per pixel from which on a gradient is an edge's: these multiples of the median, which is noise, within these bounds.
-const EDGE_OF_MEDIAN: f32 = 4.0;
-const EDGE: (f32, f32) = (2.0, 5.0);
 /// How far a pixel's gradient may turn from its region's, radians.
 const TOLERANCE: f64 = 22.5 * std::f64::consts::PI / 180.0;
 /// Straight regions are this thin: spread of their gradients' weight across, pixels rms.
@@ -34,15 +31,6 @@ impl Segment {
     pub fn length(self) -> f64 {
         self.from.distance(self.to)
     }
-
-    pub fn middle(self) -> DVec2 {
-        0.5 * (self.from + self.to)
-    }
-
-    /// Unit length.
-    pub fn direction(self) -> DVec2 {
-        (self.to - self.from).normalize()
-    }
 }
 
 impl Grey {
@@ -51,7 +39,8 @@ impl Grey {
         let (width, height) = (self.width, self.height);
         let pass = |codes: &[f32], along_x: bool| -> Vec<f32> {
             let at = |x: usize, y: usize, d: i64| {
-                let clamp = |v: usize, most: usize| (v as i64 + d).clamp(0, most as i64 - 1) as usize;
+                let clamp =
+                    |v: usize, most: usize| (v as i64 + d).clamp(0, most as i64 - 1) as usize;
                 match along_x {
                     true => codes[y * width + clamp(x, width)],
                     false => codes[clamp(y, height) * width + x],
@@ -100,7 +89,10 @@ impl Gradients {
     }
 
     fn place(&self, pixel: usize) -> DVec2 {
-        DVec2::new((pixel % self.width) as f64 + 0.5, (pixel / self.width) as f64 + 0.5)
+        DVec2::new(
+            (pixel % self.width) as f64 + 0.5,
+            (pixel / self.width) as f64 + 0.5,
+        )
     }
 
     /// All that touch each other from `seed` on and whose gradients agree with their mean.
@@ -178,8 +170,8 @@ impl Gradients {
     }
 }
 
-/// The straight edges of a picture, the longest first.
-pub fn segments(grey: &Grey) -> Vec<Segment> {
+/// The straight edges of a picture, the longest first, where codes change by `edge` a pixel and more.
+pub fn segments(grey: &Grey, edge: f32) -> Vec<Segment> {
     if grey.width < 3 || grey.height < 3 {
         return Vec::new();
     }
@@ -187,11 +179,7 @@ pub fn segments(grey: &Grey) -> Vec<Segment> {
     let strength: Vec<f32> = (gradients.vectors.iter())
         .map(|vector| vector.length() as f32)
         .collect();
-    let mut sorted = strength.clone();
-    let middle = sorted.len() / 2;
-    let (_, median, _) = sorted.select_nth_unstable_by(middle, f32::total_cmp);
-    let least = (EDGE_OF_MEDIAN * *median).clamp(EDGE.0, EDGE.1);
-    let mut taken: Vec<bool> = strength.iter().map(|s| *s < least).collect();
+    let mut taken: Vec<bool> = strength.iter().map(|s| *s < edge).collect();
     let mut order: Vec<usize> = (0..taken.len()).filter(|pixel| !taken[*pixel]).collect();
     order.sort_by(|a, b| strength[*b].total_cmp(&strength[*a]));
     let least_px = LEAST_LENGTH * (grey.width as f64).hypot(grey.height as f64);
@@ -230,14 +218,14 @@ mod tests {
     #[test]
     fn the_sides_of_a_square_are_found_to_a_fraction_of_a_pixel() {
         for turn in [0.0, 0.2, 0.6] {
-            let found = segments(&square(turn));
+            let found = segments(&square(turn), 5.0);
             assert_eq!(found.len(), 4, "{turn}");
             let axis = DVec2::from_angle(turn);
             for segment in found {
-                let d = segment.middle() - DVec2::new(60.0, 50.0);
+                let d = 0.5 * (segment.from + segment.to) - DVec2::new(60.0, 50.0);
                 let (u, v) = (d.dot(axis).abs(), d.perp_dot(axis).abs());
                 assert!((u.max(v) - 30.0).abs() < 0.15, "{segment:?} {u} {v}");
-                let lean = segment.direction().dot(axis).abs();
+                let lean = (segment.to - segment.from).normalize().dot(axis).abs();
                 let off = lean.min((1.0 - lean * lean).max(0.0).sqrt());
                 assert!(off < 0.005, "{off}");
                 assert!((segment.length() - 60.0).abs() < 5.0);
@@ -256,7 +244,7 @@ mod tests {
             height: 100,
             codes,
         };
-        let longest = |grey: &Grey| segments(grey).first().map_or(0.0, |s| s.length());
+        let longest = |grey: &Grey| segments(grey, 5.0).first().map_or(0.0, |s| s.length());
         assert!(longest(&grey(disc.collect())) < 30.0);
         assert_eq!(longest(&grey(vec![90.0; 12000])), 0.0);
         assert!(longest(&square(0.3)) > 50.0, "control");

@@ -56,8 +56,6 @@ pub struct Axes {
     pub focal_px: f64,
     /// Columns are the axes; x right, y down, z ahead.
     pub axes: DMat3,
-    /// See [`BEND_PRIOR`].
-    pub bend: f64,
     /// Standard deviations: of the logarithm of the focal length, and of the axes' direction, radians.
     pub focal_sigma: f64,
     pub axis_sigma: DVec3,
@@ -100,7 +98,9 @@ impl Line {
 
     /// How far it points past where `vanishing` (x, y, w) is, in standard deviations.
     fn misses(&self, vanishing: DVec3, bend: f64) -> f64 {
-        let [p, q] = self.ends.map(|end| end / (1.0 + bend * end.length_squared()));
+        let [p, q] = self
+            .ends
+            .map(|end| end / (1.0 + bend * end.length_squared()));
         let towards = vanishing.truncate() - 0.5 * (p + q) * vanishing.z;
         let along = q - p;
         towards.perp_dot(along) / (towards.length() * along.length()).max(1e-300) / self.sigma
@@ -145,7 +145,9 @@ impl Assignment {
                 _ => None,
             });
             let share = own.clone().map(|(hit, _)| hit).sum::<f64>() / lines.len() as f64;
-            own.map(|(hit, chance)| hit * (share / chance).log2()).sum::<f64>().max(0.0)
+            own.map(|(hit, chance)| hit * (share / chance).log2())
+                .sum::<f64>()
+                .max(0.0)
         });
         let mut order = [0, 1, 2];
         order.sort_by(|a, b| bits[*b].total_cmp(&bits[*a]));
@@ -187,7 +189,10 @@ pub fn find_axes(
     let mut starts: Vec<(f64, State)> = Vec::new();
     for (i, a) in points.iter().enumerate() {
         for b in &points[..i] {
-            starts.extend(start(*a, *b, known.map(|_| prior.0.exp())).map(|state| (Assignment::of(&lines, &state).score(), state)));
+            starts.extend(
+                start(*a, *b, known.map(|_| prior.0.exp()))
+                    .map(|state| (Assignment::of(&lines, &state).score(), state)),
+            );
         }
     }
     starts.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -219,11 +224,15 @@ fn vanishing_points(lines: &[Line]) -> Vec<DVec3> {
     let mut bundles: Vec<(Vec<bool>, Vec<DVec3>)> = Vec::new();
     for (_, point) in tried {
         let own = runs_to(point);
-        let known = bundles.iter().position(|(other, _)| overlap(&own, other) > SAME_BUNDLE);
+        let known = bundles
+            .iter()
+            .position(|(other, _)| overlap(&own, other) > SAME_BUNDLE);
         match known {
             Some(index) => {
                 let places = &mut bundles[index].1;
-                let apart = places.iter().all(|place| place.cross(point).length() > 0.01);
+                let apart = places
+                    .iter()
+                    .all(|place| place.cross(point).length() > 0.01);
                 if apart && places.len() < PLACES {
                     places.push(point);
                 }
@@ -237,7 +246,8 @@ fn vanishing_points(lines: &[Line]) -> Vec<DVec3> {
 
 /// Of all that are in one, the share that is in both.
 fn overlap(a: &[bool], b: &[bool]) -> f64 {
-    let count = |both: fn(bool, bool) -> bool| a.iter().zip(b).filter(|(a, b)| both(**a, **b)).count();
+    let count =
+        |both: fn(bool, bool) -> bool| a.iter().zip(b).filter(|(a, b)| both(**a, **b)).count();
     count(|a, b| a && b) as f64 / count(|a, b| a || b).max(1) as f64
 }
 
@@ -246,7 +256,11 @@ fn start(a: DVec3, b: DVec3, focal: Option<f64>) -> Option<State> {
     let squared = -a.truncate().dot(b.truncate()) / (a.z * b.z);
     let focal = focal.unwrap_or(squared.max(0.0).sqrt());
     // Points that are nearly at infinity tell none: the lines have to.
-    let focal = if FOCAL.contains(&focal) { focal } else { FOCAL_PRIOR.0 };
+    let focal = if FOCAL.contains(&focal) {
+        focal
+    } else {
+        FOCAL_PRIOR.0
+    };
     let axis = |v: DVec3| DVec3::new(v.x / focal, v.y / focal, v.z).normalize();
     let (first, second) = (axis(a), axis(b));
     if first.dot(second).abs() > MOST_SKEW {
@@ -312,7 +326,9 @@ fn refine(
             break;
         }
     }
-    FOCAL.contains(&state.log_focal.exp()).then_some((state, covariance))
+    FOCAL
+        .contains(&state.log_focal.exp())
+        .then_some((state, covariance))
 }
 
 fn finish(lines: &[Line], state: State, covariance: &SMatrix<f64, 5, 5>, unit_px: f64) -> Axes {
@@ -331,7 +347,6 @@ fn finish(lines: &[Line], state: State, covariance: &SMatrix<f64, 5, 5>, unit_px
     Axes {
         focal_px: state.log_focal.exp() * unit_px,
         axes,
-        bend: state.bend,
         focal_sigma: covariance[(3, 3)].sqrt(),
         axis_sigma: DVec3::from(axis_sigma),
         runs_along: (assignment.of_lines.iter())
