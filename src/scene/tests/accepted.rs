@@ -278,6 +278,46 @@ fn the_desk_camera() {
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
 }
 
+/// `[sharpness]`: measured, or given by one number or many, and not both.
+#[test]
+fn sharpness_is_measured_or_given() {
+    use crate::scene::{PointSpread, SharpnessSettings};
+
+    let read = |table: &str| {
+        load_with_camera(&format!("[sharpness]\n{table}"))
+            .stages
+            .sharpness
+    };
+    assert_eq!(load_with_camera("").stages.sharpness, None);
+    let measured = SharpnessSettings { given: None };
+    assert_eq!(read("from = \"photo\"\n"), Some(measured));
+    let given = |spread| {
+        Some(SharpnessSettings {
+            given: Some(spread),
+        })
+    };
+    assert_eq!(read("sigma_px = 0.8\n"), given(PointSpread::gaussian(0.8)));
+    let all = "sigma_px = [0.5, 0.75, 1]\ncorner_sigma_px = 1.5\nsharpening = 2\nsharpening_radius_px = 1.25\nlateral_px = [0.5, -0.25]\n";
+    let expected = PointSpread {
+        sigma_px: [0.5, 0.75, 1.0],
+        corner_sigma_px: [1.5; 3],
+        sharpening: 2.0,
+        sharpening_radius_px: 1.25,
+        lateral_px: [0.5, -0.25],
+    };
+    assert_eq!(read(all), given(expected));
+    for refused in [
+        "",
+        "from = \"lens\"\n",
+        "from = \"photo\"\nsigma_px = 1\n",
+        "sigma_px = 6\n",
+        "sharpening = 1\n",
+    ] {
+        let scene = format!("{CAMERA}[sharpness]\n{refused}");
+        assert!(Folder::new().load(&scene).is_err(), "{refused}");
+    }
+}
+
 /// The tables of camera stages: absent is off, empty is the documented defaults, and every key arrives.
 #[test]
 fn stages_are_off_default_or_as_given() {

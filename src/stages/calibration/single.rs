@@ -276,7 +276,7 @@ fn bin_of(
     true_variance: &dyn Fn(f64, usize) -> f64,
 ) -> NoiseBin {
     let mut bin = NoiseBin::default();
-    for c in 0..3 {
+    for (c, lags) in correlation.iter().enumerate() {
         if blocks.is_empty() {
             bin.filled[c] = true;
             continue;
@@ -286,7 +286,7 @@ fn bin_of(
         let pixels = blocks.len() as f64 * (STEP * STEP) as f64;
         let sigma = true_variance(variances[variances.len() / 2], c).sqrt();
         // Of a standard deviation, 1 / sqrt(2 n); and what no number of blocks makes smaller.
-        let chance = NORMAL_Z / (2.0 * pixels / squared_lags(&correlation[c])).sqrt();
+        let chance = NORMAL_Z / (2.0 * pixels / squared_lags(lags)).sqrt();
         let error = sigma * chance.hypot(SYSTEMATIC);
         bin.sigma[c] = sigma;
         bin.low[c] = (sigma - error).max(0.0);

@@ -20,7 +20,7 @@ fn photograph(sigma: f32, is_grain: bool) -> EncodedPhoto {
         let (x, y) = ((i as u32 % width) as f32, (i as u32 / width) as f32);
         // A board of squares in one half, which is no noise.
         let board = f32::from(u8::from(
-            x > 128.0 && (x as u32 / 5 + y as u32 / 5) % 2 == 0,
+            x > 128.0 && (x as u32 / 5 + y as u32 / 5).is_multiple_of(2),
         ));
         [0, 1, 2].map(|c| {
             let white = |i: usize| normal(3 * i + c);
