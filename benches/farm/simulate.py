@@ -39,7 +39,7 @@ def measure(mixray, shot):
         video = [mixray, "sequence", shot / "video.toml", "--frames", shot / "frames", "--trajectory", shot / "poses.json", "--threads=1"]
         one = processor_secs(*video, "--range=0..1", "-o", out / "one")
         three = processor_secs(*video, "--range=0..3", "-o", out / "three")
-        looked_at = processor_secs(*video, "--range=0..3", "-o", out / "three")
+        looked_at = [processor_secs(*video, f"--range=0..{count}", "-o", out / name) for count, name in ((1, "one"), (3, "three"))]
         still = [mixray, "render", shot / "still.toml", "--rpp=8", "--threads=1"]
         few = processor_secs(*still, "--range=0..1", "-o", out / "few.exr")
         more = processor_secs(*still, "--range=1..4", "-o", out / "more.exr")
@@ -50,7 +50,7 @@ def measure(mixray, shot):
             "start": start,
             "frame": frame,
             "frames_task_without_frames": one - frame,
-            "look_at_frame": max(looked_at - (one - frame), 0) / 3,
+            "look_at_frame": max(looked_at[1] - looked_at[0], 0) / 2,
             "ray_per_pixel": ray,
             "rays_task_without_rays": few - ray,
             "merge_without_parts": 2 * merged[0] - merged[1],
