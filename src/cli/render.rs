@@ -9,6 +9,7 @@ use super::picture_flags::PictureFlags;
 use super::progress::Bar;
 use super::values::part;
 use super::{Failure, Outcome, interrupt, print, say, summary};
+use crate::files;
 use crate::output::{
     ExrLayer, ExrLayers, FilmNote, Format, Metadata, PngBits, Target, check_writable, read_film,
     write_exr, write_film, write_png, write_text,
@@ -223,6 +224,7 @@ fn is_kept(path: &Path, renderer: &Renderer, range: (u32, u32)) -> Result<bool, 
     if !path.exists() {
         return Ok(false);
     }
+    files::read_back(path);
     let (_, found) = read_film(path)?;
     let without = renderer.without().of_films(renderer.gpu_device().is_some());
     let wanted = FilmNote::new(renderer.scene(), range, without);
