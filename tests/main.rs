@@ -3,6 +3,8 @@
 mod architecture;
 mod backends;
 mod bench;
+mod blender;
+mod checking;
 mod cli;
 mod farm;
 mod faults;

@@ -8,7 +8,10 @@ mod antialias;
 mod bench;
 mod bundle;
 mod cartoon;
+mod check;
 mod compare;
+mod export_blender;
+mod file_info;
 mod forwarded;
 mod frame_flags;
 mod goal_flags;
@@ -17,7 +20,10 @@ mod interrupt;
 mod layers;
 mod merge;
 mod motion_blur;
+#[cfg(feature = "start")]
+mod new;
 mod noise;
+mod pick;
 mod picture_flags;
 mod pool;
 mod preview;
@@ -25,6 +31,7 @@ mod progress;
 mod render;
 mod scene_flags;
 mod sequence;
+mod sharpness;
 mod stage_device;
 mod submit;
 mod summary;
@@ -56,9 +63,13 @@ struct Arguments {
 enum Command {
     Render(render::Arguments),
     Preview(preview::Arguments),
+    Check(check::Arguments),
+    Pick(pick::Arguments),
     Sequence(sequence::Arguments),
     #[cfg(feature = "track")]
     Track(Box<track::Arguments>),
+    #[cfg(feature = "start")]
+    New(Box<new::Arguments>),
     Merge(merge::Arguments),
     Submit(Box<submit::Arguments>),
     Bundle(bundle::Arguments),
@@ -66,9 +77,11 @@ enum Command {
     Bench(Box<bench::Arguments>),
     Cartoon(cartoon::Arguments),
     Noise(noise::Arguments),
+    Sharpness(sharpness::Arguments),
     Antialias(antialias::Arguments),
     MotionBlur(motion_blur::Arguments),
     Compare(compare::Arguments),
+    ExportBlender(export_blender::Arguments),
     Info(info::Arguments),
 }
 
@@ -124,9 +137,13 @@ fn run_command() -> ExitCode {
     let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Preview(arguments) => preview::run(&arguments),
+        Command::Check(arguments) => all_threads().and_then(|()| check::run(&arguments)),
+        Command::Pick(arguments) => all_threads().and_then(|()| pick::run(&arguments)),
         Command::Sequence(arguments) => sequence::run(&arguments),
         #[cfg(feature = "track")]
         Command::Track(arguments) => track::run(&arguments),
+        #[cfg(feature = "start")]
+        Command::New(arguments) => new::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
         Command::Submit(arguments) => {
             let typed = matches.subcommand_matches("submit").unwrap_or(&matches);
@@ -137,9 +154,13 @@ fn run_command() -> ExitCode {
         Command::Bench(arguments) => bench::run(*arguments),
         Command::Cartoon(arguments) => all_threads().and_then(|()| cartoon::run(&arguments)),
         Command::Noise(arguments) => all_threads().and_then(|()| noise::run(&arguments)),
+        Command::Sharpness(arguments) => all_threads().and_then(|()| sharpness::run(&arguments)),
         Command::Antialias(arguments) => all_threads().and_then(|()| antialias::run(&arguments)),
         Command::MotionBlur(arguments) => all_threads().and_then(|()| motion_blur::run(&arguments)),
         Command::Compare(arguments) => all_threads().and_then(|()| compare::run(&arguments)),
+        Command::ExportBlender(arguments) => {
+            all_threads().and_then(|()| export_blender::run(&arguments))
+        }
         Command::Info(arguments) => all_threads().and_then(|()| info::run(&arguments)),
     };
     match result {

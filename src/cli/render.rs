@@ -9,6 +9,7 @@ use super::picture_flags::PictureFlags;
 use super::progress::Bar;
 use super::values::part;
 use super::{Failure, Outcome, interrupt, print, say, summary};
+use crate::check::{self, Extent};
 use crate::files;
 use crate::output::{
     ExrLayer, ExrLayers, FilmNote, Format, Metadata, PngBits, Target, check_writable, read_film,
@@ -170,6 +171,14 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     for (saving, reason) in without.idle(estimator, on_gpu, goal.as_ref()) {
         bar.aside(|| say_idle(saving, reason));
     }
+    let mut findings = check::scene(renderer.scene(), Extent::Still);
+    let fitted_ev = renderer.fitted_exposure_ev();
+    findings.extend(check::exposure(renderer.scene(), fitted_ev));
+    bar.aside(|| {
+        for finding in &findings {
+            say("warning", &finding.to_string());
+        }
+    });
     let goal = goal.map(|goal| goal.without(without));
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();

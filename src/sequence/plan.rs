@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{Event, SequenceError, SequenceOptions};
+use crate::check::{self, Extent};
 use crate::scene::trajectory::{
     FrameName, FrameView, Intrinsics, Trajectory, Views, read_intrinsics,
 };
@@ -48,6 +49,9 @@ impl Files {
         scene.settings.apply(&options.overrides);
         for warning in &scene.warnings {
             hear(&Event::Warning(warning.clone()));
+        }
+        for finding in check::scene(&scene, Extent::WithoutCamera) {
+            hear(&Event::Warning(finding.to_string()));
         }
         Ok(scene)
     }
