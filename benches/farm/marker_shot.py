@@ -2,7 +2,9 @@
 """A shot of 24 frames of the hand-held marker video: frames, poses, and a scene for the video and for a still.
 
     pip install opencv-python-headless
-    benches/farm/marker_shot.py ../shared/data/webcam_marker_grid_video SHOT
+    benches/farm/marker_shot.py ../shared/data/webcam_marker_grid_video SHOT [SHRINK]
+
+SHRINK divides width and height.
 """
 import json
 import pathlib
@@ -17,7 +19,7 @@ radiance = [0.6, 0.6, 0.65]
 [[light]]
 kind = "directional"
 direction = [0.4, -1, -0.3]
-irradiance = [1.5, 1.4, 1.3]
+irradiance = [0.8, 0.75, 0.7]
 [[real]]
 name = "paper"
 shape = "quad"
@@ -38,19 +40,26 @@ backend = "cpu"
 
 
 def main():
-    data, shot = map(pathlib.Path, sys.argv[1:])
+    data, shot = map(pathlib.Path, sys.argv[1:3])
+    shrink = int(sys.argv[3]) if len(sys.argv) > 3 else 1
     (shot / "frames").mkdir(parents=True, exist_ok=True)
     video = cv2.VideoCapture(str(data / "movie.mp4"))
     for number in range(FRAMES):
         whole, frame = video.read()
         assert whole, f"frame {number} of the video cannot be read"
+        height, width = frame.shape[:2]
+        frame = cv2.resize(frame, (width // shrink, height // shrink), interpolation=cv2.INTER_AREA)
         cv2.imwrite(str(shot / "frames" / f"frame_{number:04}.png"), frame)
     poses = json.loads((data / "trajectory.json").read_text())
+    poses["width"], poses["height"] = width // shrink, height // shrink
+    for name in ("fx", "fy"):
+        poses[name] /= shrink
+    # Pixel centres count from 0 in the file.
+    for name in ("cx", "cy"):
+        poses[name] = (poses[name] + 0.5) / shrink - 0.5
     (shot / "poses.json").write_text(json.dumps(poses))
     first = next(frame for frame in poses["frames"] if frame["camera_to_world_gltf"])
     rows = first["camera_to_world_gltf"]
-    # Of the still: pixel centres count from 0 in the file, corners in a scene.
-    rows = rows if isinstance(rows[0], list) else [rows[i : i + 4] for i in range(0, 16, 4)]
     lens = poses["distortion"]
     camera = (
         f"[camera]\nfx = {poses['fx']}\nfy = {poses['fy']}\ncx = {poses['cx'] + 0.5}\ncy = {poses['cy'] + 0.5}\n"
@@ -58,7 +67,7 @@ def main():
     )
     (shot / "video.toml").write_text(SCENE.format(photo="", camera="", rays=2))
     photo = '[photo]\nimage = "frames/frame_0000.png"\n'
-    (shot / "still.toml").write_text(SCENE.format(photo=photo, camera=camera, rays=32))
+    (shot / "still.toml").write_text(SCENE.format(photo=photo, camera=camera, rays=16))
 
 
 main()

@@ -116,7 +116,12 @@ impl Bar {
 
     pub(super) fn hear(&self, progress: &Progress) {
         if let Some(lines) = &self.lines {
-            lines.tell(progress.share_done, progress.phase.name());
+            // Shares are of a phase; what goes before the rays is little.
+            let share_done = match progress.phase {
+                Phase::Rendering => progress.share_done,
+                _ => 0.0,
+            };
+            lines.tell(share_done, progress.phase.name());
         }
         let Some(bar) = &self.bar else { return };
         bar.set_prefix(progress.phase.name());

@@ -10,6 +10,7 @@ use super::progress::{Bar, SCRAMBLES};
 use super::values::part;
 use super::{Failure, Outcome, interrupt, say, summarize, summary};
 use crate::check::{self, Extent};
+use crate::files;
 use crate::output::{
     ExrLayer, ExrLayers, ExrPicture, FilmNote, Format, Metadata, PngBits, Target,
     check_writable_as, read_film, write_exr, write_film, write_png, write_text,
@@ -232,6 +233,7 @@ fn is_kept(path: &Path, renderer: &Renderer, range: (u32, u32)) -> Result<bool, 
     if !path.exists() {
         return Ok(false);
     }
+    files::read_back(path);
     let (_, found) = read_film(path)?;
     let without = renderer.without().of_films(renderer.gpu_device().is_some());
     let wanted = FilmNote::new(renderer.scene(), range, without);

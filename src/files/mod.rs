@@ -100,8 +100,14 @@ pub(crate) fn output(path: &Path) -> Result<(), Conflict> {
 #[cfg(any(feature = "bench", feature = "start"))]
 pub(crate) fn own(path: &Path) -> Result<(), Conflict> {
     output(path)?;
-    with(|registry| registry.own(&resolved(path)));
+    read_back(path);
     Ok(())
+}
+
+/// An output that is named already is read by the run too, which makes it no input.
+#[cfg(feature = "cli")]
+pub(crate) fn read_back(path: &Path) {
+    with(|registry| registry.own(&resolved(path)));
 }
 
 /// Fails if [`output`] would, and names nothing.

@@ -6,7 +6,7 @@ use crate::support::Folder;
 /// Far enough apart for the coordinates' origin to move, with an exposure that is fitted to the first posed frame, and a focus that is pulled.
 fn folder() -> Folder {
     let folder = Folder::new();
-    let scene = BALL.replace("[render]\n", "[render]\nexposure_ev = \"auto\"\n");
+    let scene = format!("{BALL}[photo]\nexposure_ev = \"auto\"\n");
     folder.write("scene.toml", scene);
     folder.frames(7, 0.4);
     folder.trajectory(7, 0.4, &[0, 4]);
