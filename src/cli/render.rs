@@ -31,13 +31,8 @@ pub(super) struct Arguments {
     output: Vec<PathBuf>,
     /// Layers of .exr pictures, with commas between: composite, difference, mask, depth, normal, albedo, variance, samples, real, mixed.
     /// real and mixed ask for the real light everywhere, which may cost several times the rest [default: composite, difference, mask,
-    /// depth, normal, variance, samples; with the quotient composite real too; with --range all]
-    #[arg(
-        long,
-        value_name = "NAME,...",
-        value_delimiter = ',',
-        conflicts_with = "range"
-    )]
+    /// depth, normal, variance, samples; with the quotient composite real too]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     layers: Vec<ExrLayer>,
     #[command(flatten)]
     flags: PictureFlags,
@@ -127,13 +122,10 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let load_secs = start.elapsed().as_secs_f64();
 
     let is_exr = targets.iter().any(|t| t.format() == Format::Exr);
-    // A film that goes on has everything that it may be asked for.
-    let layers = match job.range {
-        Some(_) => ExrLayers::all(),
-        None => ExrLayers::new(&job.layers, scene.settings.composite),
-    };
+    let layers = ExrLayers::new(&job.layers, scene.settings.composite);
     let options = RendererOptions {
-        guides: is_exr && layers.need_guides(),
+        // A film has what merge cannot make up for.
+        guides: is_exr && (layers.need_guides() || job.range.is_some()),
         real_everywhere: is_exr && layers.need_real_everywhere(),
         sample_range: job.range,
         without: job.flags.without(),
@@ -238,7 +230,8 @@ pub(super) fn write(
             }
             Format::Exr => {
                 let metadata = Metadata::of(renderer);
-                let planes = renderer.planes();
+                let (mut picture, mut planes) = (picture.clone(), renderer.planes());
+                layers.pick(&mut picture, &mut planes);
                 if let Some(range) = film_range {
                     let film = renderer.film();
                     let on_gpu = renderer.gpu_device().is_some();
@@ -246,8 +239,6 @@ pub(super) fn write(
                     let note = FilmNote::new(renderer.scene(), range, without);
                     write_film(target, &picture, &planes, &metadata, film, &note)?;
                 } else {
-                    let (mut picture, mut planes) = (picture.clone(), planes);
-                    layers.pick(&mut picture, &mut planes);
                     write_exr(target, &picture, &planes, &metadata)?;
                 }
             }

@@ -70,10 +70,6 @@ impl ExrLayers {
         Self(ExrLayer::USUAL.into_iter().chain(real).collect())
     }
 
-    pub fn all() -> Self {
-        Self(ExrLayer::NAMES.map(|(_, layer)| layer).to_vec())
-    }
-
     /// Real rays are traced where nothing virtual needs them.
     pub fn need_real_everywhere(&self) -> bool {
         self.has(ExrLayer::Real) || self.has(ExrLayer::Mixed)
