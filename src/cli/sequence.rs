@@ -29,7 +29,7 @@ pub(super) struct Arguments {
     frames: Option<PathBuf>,
     #[arg(long, value_name = "FILE", help = format!("Poses: {FORMATS}"))]
     trajectory: PathBuf,
-    /// OpenCV calibration (YAML) in place of the intrinsics of trajectory and scene
+    /// Calibration of OpenCV, ROS or Kalibr (YAML) in place of the intrinsics of trajectory and scene
     #[arg(long, value_name = "FILE")]
     intrinsics: Option<PathBuf>,
     /// Folder for PNG files, .y4m file, or - for Y4M on standard output

@@ -95,7 +95,7 @@ pub(super) fn read_picture(bytes: &[u8], layer: Option<&str>) -> Result<ImageFil
     {
         warnings.push("its chromaticities are ignored: it is read as linear Rec.709".to_owned());
     }
-    if find(header, "A").is_some() {
+    if find(header, "", "A").is_some() {
         warnings.push(ALPHA.to_owned());
     }
     let mut wanted = rgb.to_vec();
@@ -106,6 +106,17 @@ pub(super) fn read_picture(bytes: &[u8], layer: Option<&str>) -> Result<ImageFil
         .map(into_f32)
         .collect();
     let data = header.data_window();
+    let meets = |axis: fn(&Vec2<i32>) -> i32| {
+        let end = |bounds: IntegerBounds| axis(&bounds.max());
+        axis(&data.position) <= end(window) && axis(&window.position) <= end(data)
+    };
+    if !(meets(|p| p.0) && meets(|p| p.1)) {
+        return Err(format!(
+            "its data window {} lies outside of its display window {}; expected a picture in the display window; render the frame again",
+            shown(data),
+            shown(window)
+        ));
+    }
     if data != window {
         warnings.push(format!(
             "its data window {} is not its display window {}: it is placed there, the rest is black",
@@ -171,6 +182,9 @@ const PICTURE_NAMES: [&str; 7] = [
     "main",
 ];
 
+/// Red, green and blue as channels are called, in letters of any case.
+const COLOURS: [[&str; 3]; 2] = [["R", "G", "B"], ["red", "green", "blue"]];
+
 /// A part and the channels of a picture.
 type Place = (usize, [usize; 3]);
 
@@ -184,14 +198,11 @@ fn pictures(headers: &[Header]) -> Vec<(String, Place)> {
         };
         for channel in &header.channels.list {
             let name = text_of(&channel.name);
-            let Some(layer) = name
-                .strip_suffix('R')
-                .filter(|l| l.is_empty() || l.ends_with('.'))
-            else {
+            let (layer, colour) = name.split_at(name.rfind('.').map_or(0, |point| point + 1));
+            let Some(colours) = COLOURS.iter().find(|c| colour.eq_ignore_ascii_case(c[0])) else {
                 continue;
             };
-            let rgb = ["R", "G", "B"].map(|c| find(header, &format!("{layer}{c}")));
-            if let [Some(r), Some(g), Some(b)] = rgb {
+            if let [Some(r), Some(g), Some(b)] = colours.map(|c| find(header, layer, c)) {
                 let names = [part_name.as_str(), layer.trim_end_matches('.')];
                 let whole = names.join(".").trim_matches('.').to_owned();
                 found.push((whole, (part, [r, g, b])));
@@ -227,22 +238,29 @@ fn pick(headers: &[Header]) -> Result<Place, String> {
     let mut found = pictures(headers);
     let rank = |name: &str| {
         let last = name.rsplit('.').next().unwrap_or_default();
-        match last.to_ascii_lowercase() {
-            last if last.is_empty() => 0,
-            last if PICTURE_NAMES.contains(&last.as_str()) => 1,
-            _ => 2,
+        let is_last = |own: &&str| last.eq_ignore_ascii_case(own);
+        match last {
+            "" => 0,
+            _ => 1 + (PICTURE_NAMES.iter().position(is_last)).unwrap_or(PICTURE_NAMES.len()),
         }
     };
     found.sort_by_key(|(name, (part, _))| (rank(name), *part));
     match found.as_slice() {
-        [(name, place), rest @ ..] if rank(name) < 2 || rest.is_empty() => Ok(*place),
+        [(_, place)] => Ok(*place),
+        [(name, place), ..] if rank(name) == 0 => Ok(*place),
+        // Several of the same name, as of several view layers, are not told apart by it.
+        [(name, place), (next, _), ..]
+            if rank(name) <= PICTURE_NAMES.len() && rank(name) < rank(next) =>
+        {
+            Ok(*place)
+        }
         [] => grey(headers).ok_or_else(|| {
             "it has no channels R, G, B or Y; expected an RGB or grey image; convert it".to_owned()
         }),
         several => {
             let names: Vec<&str> = several.iter().map(|(name, ..)| name.as_str()).collect();
             Err(format!(
-                "it holds several pictures ({}) and none is named as the one; expected R, G and B without a layer, or one of {}; name it, or say which after the file's name (a.exr#layer)",
+                "it holds several pictures ({}) and no single one is named as such; expected R, G and B without a layer, or one of {}; name it, or say which after the file's name (a.exr#layer)",
                 names.join(", "),
                 PICTURE_NAMES.join(", ")
             ))
@@ -253,14 +271,20 @@ fn pick(headers: &[Header]) -> Result<Place, String> {
 /// With RY and BY beside it, Y alone would lose the colour.
 fn grey(headers: &[Header]) -> Option<(usize, [usize; 3])> {
     headers.iter().enumerate().find_map(|(part, header)| {
-        let grey = find(header, "Y").filter(|_| find(header, "RY").is_none())?;
+        let grey = find(header, "", "Y").filter(|_| find(header, "", "RY").is_none())?;
         Some((part, [grey; 3]))
     })
 }
 
-fn find(header: &Header, name: &str) -> Option<usize> {
+/// `layer` ends with its point, if it has a name.
+fn find(header: &Header, layer: &str, colour: &str) -> Option<usize> {
+    let is_own = |name: &str| {
+        (name.strip_prefix(layer)).is_some_and(|rest| rest.eq_ignore_ascii_case(colour))
+    };
     let channels = &header.channels.list;
-    channels.iter().position(|channel| channel.name.eq(name))
+    channels
+        .iter()
+        .position(|channel| is_own(&text_of(&channel.name)))
 }
 
 /// The headers of a file, each within the limits and not beyond what the file can hold.

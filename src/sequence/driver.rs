@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::plan::{Files, check_frames, check_rate, in_range, known_rate, views};
+use super::plan::{Files, check_focus, check_frames, check_rate, in_range, known_rate, views};
 use super::report::{FrameCounts, SequenceSeconds, SequenceStats};
 use super::{Event, SequenceError, SequenceOptions};
 use crate::output::PngBits;
@@ -81,6 +81,7 @@ pub fn render_sequence(
         names: names.unwrap_or_default(),
         hear,
         told: HashSet::new(),
+        lost: Vec::new(),
         started: None,
         frames: FrameCounts::default(),
         seconds: SequenceSeconds::default(),
@@ -144,6 +145,8 @@ struct Sequence<'a> {
     hear: &'a dyn Fn(&Event<'_>),
     /// Warnings of frames.
     told: HashSet<String>,
+    /// Frames before the first of which anything is there.
+    lost: Vec<FrameName>,
     started: Option<Started>,
     frames: FrameCounts,
     seconds: SequenceSeconds,
@@ -336,8 +339,7 @@ impl Sequence<'_> {
         Ok(true)
     }
 
-    /// A frame of which a part is lost goes on as it is, or is left out where there is nothing of it: so the others keep their names, and in
-    /// a film their places.
+    /// A frame of which a part is lost goes on as far as it is there; where nothing is, the one before keeps its place.
     fn pass_damaged(
         &mut self,
         name: &FrameName,
@@ -348,14 +350,17 @@ impl Sequence<'_> {
         let reason = problem.split("; ").next().unwrap_or(problem);
         let tell = |what: &str| (self.hear)(&Event::Warning(format!("{reason}; {what}")));
         let Some(frame) = rest else {
-            if let Some(started) = &mut self.started
-                && started.sink.repeat()?
-            {
-                tell("the frame before stands for it");
-                self.frames.passed_through += 1;
-            } else {
-                tell("the frame is left out");
+            match &mut self.started {
+                Some(started) => {
+                    tell("the frame before stands for it");
+                    started.sink.stand_in(name)?;
+                }
+                None => {
+                    tell("grey stands for it");
+                    self.lost.push(name.clone());
+                }
             }
+            self.frames.passed_through += 1;
             return Ok(());
         };
         tell("the frame passes through");
@@ -387,6 +392,7 @@ impl Sequence<'_> {
             self.files
                 .scene(self.options, view, Some(frame.photo.clone()), self.hear)?;
         check_rate(&scene, self.rate, self.views.have_own_times())?;
+        check_focus(self.options, &self.files.trajectory, &scene.lens)?;
         let size = (frame.photo.width, frame.photo.height);
         // The photograph of the moment is no part of what the frames are made with.
         let size = scene
@@ -396,7 +402,7 @@ impl Sequence<'_> {
         let options = self.options;
         let mut header = header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate));
         header.matrix = options.matrix.unwrap_or(header.matrix);
-        let sink = FrameSink::open(SinkPlan {
+        let mut sink = FrameSink::open(SinkPlan {
             path: &options.output,
             fingerprint: self.fingerprint(&scene),
             header,
@@ -404,6 +410,9 @@ impl Sequence<'_> {
             overwrite: options.overwrite,
             names: self.names.clone(),
         })?;
+        for name in &self.lost {
+            sink.stand_in(name)?;
+        }
         Ok(Started {
             sink,
             size,

@@ -44,14 +44,20 @@ pub struct FrameSink {
     kind: Kind,
     png_bits: Option<PngBits>,
     header: Header,
-    /// Planes of the last frame of a film that this run has written.
-    last: Vec<u8>,
 }
 
 enum Kind {
-    Folder(PathBuf),
+    Folder {
+        path: PathBuf,
+        /// The last frame's file.
+        last: Option<PathBuf>,
+    },
     Y4mFile(Y4mFile),
-    Stdout(BufWriter<std::io::Stdout>),
+    Stdout {
+        out: BufWriter<std::io::Stdout>,
+        /// Planes of the last frame.
+        last: Option<Vec<u8>>,
+    },
 }
 
 impl FrameSink {
@@ -63,23 +69,25 @@ impl FrameSink {
             let header = format!("{}\n", plan.header.line);
             let sent = out.write_all(header.as_bytes());
             sent.map_err(|error| Place::Stdout.error(cannot_write(&error)))?;
-            Kind::Stdout(out)
+            Kind::Stdout { out, last: None }
         } else if plan.path.extension().is_some_and(|e| e == "y4m") {
             Kind::Y4mFile(open_y4m(&plan)?)
         } else {
-            Kind::Folder(open_folder(&plan)?)
+            Kind::Folder {
+                path: open_folder(&plan)?,
+                last: None,
+            }
         };
         Ok(Self {
             kind,
             png_bits: plan.png_bits,
             header: plan.header,
-            last: Vec::new(),
         })
     }
 
     /// The colours of a film; `None`: pictures are written.
     pub fn film_colours(&self) -> Option<String> {
-        (!matches!(self.kind, Kind::Folder(_))).then(|| self.header.colours())
+        (!matches!(self.kind, Kind::Folder { .. })).then(|| self.header.colours())
     }
 
     /// The frame, the next in order, is finished from an earlier run, and whole. Asked once for each, before it is written; `frame` is what
@@ -89,13 +97,13 @@ impl FrameSink {
     /// Its file is one that is read, or that of another frame.
     pub fn has(&mut self, name: &FrameName, frame: &VideoFrame) -> Result<bool, VideoError> {
         match &mut self.kind {
-            Kind::Folder(folder) => {
+            Kind::Folder { path: folder, last } => {
                 let path = png_path(folder, name);
                 check_named(&path)?;
-                Ok(is_whole(&path, frame))
+                Ok(is_whole(last.insert(path), frame))
             }
             Kind::Y4mFile(file) => file.has_next(),
-            Kind::Stdout(_) => Ok(false),
+            Kind::Stdout { .. } => Ok(false),
         }
     }
 
@@ -109,7 +117,7 @@ impl FrameSink {
         picture: &Picture,
         frame: &VideoFrame,
     ) -> Result<(), VideoError> {
-        if let Kind::Folder(folder) = &self.kind {
+        if let Kind::Folder { path: folder, .. } = &self.kind {
             let target = Target::named(&png_path(folder, name), Format::Png);
             let photo = Some(&frame.photo);
             let bits = self.png_bits.unwrap_or_else(|| PngBits::for_photo(photo));
@@ -134,7 +142,7 @@ impl FrameSink {
     /// As [`FrameSink::write`].
     pub fn pass(&mut self, name: &FrameName, frame: &VideoFrame) -> Result<(), VideoError> {
         match (&self.kind, &frame.pixels) {
-            (Kind::Folder(folder), Pixels::File(path))
+            (Kind::Folder { path: folder, .. }, Pixels::File(path))
                 if path
                     .extension()
                     .is_some_and(|e| e.eq_ignore_ascii_case("png")) =>
@@ -147,7 +155,7 @@ impl FrameSink {
                 })?;
                 Ok(write_bytes(&png_path(folder, name), &bytes)?)
             }
-            (Kind::Y4mFile(_) | Kind::Stdout(_), Pixels::Planes(planes)) => {
+            (Kind::Y4mFile(_) | Kind::Stdout { .. }, Pixels::Planes(planes)) => {
                 self.write_planes(planes)
             }
             _ => {
@@ -163,32 +171,44 @@ impl FrameSink {
         }
     }
 
-    /// In a film the last frame once more, grey before the first; false in a folder.
+    /// The frame before once more in place of one of which nothing is left; grey before the first.
     ///
     /// # Errors
-    /// As [`FrameSink::write`].
-    pub fn repeat(&mut self) -> Result<bool, VideoError> {
-        let is_there = match &mut self.kind {
-            Kind::Folder(_) => return Ok(false),
-            Kind::Y4mFile(file) => file.has_next()?,
-            Kind::Stdout(_) => false,
+    /// As [`FrameSink::has`] and [`FrameSink::write`].
+    pub fn stand_in(&mut self, name: &FrameName) -> Result<(), VideoError> {
+        let before = match &mut self.kind {
+            Kind::Folder { path: folder, last } => {
+                let path = png_path(folder, name);
+                check_named(&path)?;
+                let before = last.as_ref().map(std::fs::read).transpose();
+                let before = before
+                    .map_err(|error| Place::File(path.clone()).error(cannot_write(&error)))?;
+                match before {
+                    Some(bytes) => write_bytes(&path, &bytes)?,
+                    None => {
+                        let target = Target::named(&path, Format::Png);
+                        write_png(&target, &grey(&self.header), None, PngBits::Eight)?;
+                    }
+                }
+                return Ok(());
+            }
+            Kind::Y4mFile(file) => match file.has_next()? {
+                true => return Ok(()),
+                false => file.last()?,
+            },
+            Kind::Stdout { last, .. } => last.take(),
         };
-        if !is_there {
-            let mut planes = std::mem::take(&mut self.last);
-            planes.resize(self.header.frame_bytes(), GREY);
-            self.write_planes(&planes)?;
-        }
-        Ok(true)
+        self.write_planes(&before.unwrap_or_else(|| vec![GREY; self.header.frame_bytes()]))
     }
 
     fn write_planes(&mut self, planes: &[u8]) -> Result<(), VideoError> {
-        self.last = planes.to_vec();
         match &mut self.kind {
             Kind::Y4mFile(file) => file.write(planes),
-            Kind::Stdout(out) => {
+            Kind::Stdout { out, last } => {
+                *last = Some(planes.to_vec());
                 write_frame(out, planes).map_err(|error| Place::Stdout.error(cannot_write(&error)))
             }
-            Kind::Folder(_) => Ok(()),
+            Kind::Folder { .. } => Ok(()),
         }
     }
 
@@ -199,8 +219,19 @@ impl FrameSink {
     pub fn finish(self) -> Result<(), VideoError> {
         match self.kind {
             Kind::Y4mFile(file) => file.finish(),
-            Kind::Folder(_) | Kind::Stdout(_) => Ok(()),
+            Kind::Folder { .. } | Kind::Stdout { .. } => Ok(()),
         }
+    }
+}
+
+/// A picture of nothing.
+fn grey(header: &Header) -> Picture {
+    let (width, height) = (header.width, header.height);
+    let codes = vec![[GREY; 3]; width as usize * height as usize];
+    Picture {
+        width,
+        height,
+        linear: Photo::from_srgb8(width, height, codes).linear,
     }
 }
 

@@ -10,6 +10,7 @@ mod intrinsics;
 mod json;
 mod json_intrinsics;
 mod json_values;
+mod kalibr;
 mod kitti;
 mod opencv;
 mod path;
@@ -20,6 +21,7 @@ mod toml;
 mod tum;
 
 pub use frame_name::{FrameName, Naming};
+pub(crate) use intrinsics::half_view;
 pub use intrinsics::{Focal, Intrinsics};
 pub use opencv::read_intrinsics;
 pub use path::CameraPath;
