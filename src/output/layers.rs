@@ -32,7 +32,7 @@ impl ExrLayer {
         ("mixed", Self::Mixed),
     ];
 
-    /// What a compositor needs and costs no rays beyond those of the composite.
+    /// What a compositor needs, without light that the composite does not take: depth and normal cost each ray its first hit.
     const USUAL: [Self; 7] = [
         Self::Composite,
         Self::Difference,

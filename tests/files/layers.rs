@@ -64,7 +64,8 @@ fn exr_layers_of_films() {
     };
     let bare = part("0..8", "") + part("8..16", "");
     let (usual, of_picture) = render(&folder, "");
-    assert_eq!(bare, of_picture);
+    // What an edge lacks whose other side is in the other part is traced by the merge.
+    assert!(bare <= of_picture, "{bare}, {of_picture}");
     let names = merge("");
     for layer in &usual {
         let starts = |name: &String| name.starts_with(&format!("{layer}."));
