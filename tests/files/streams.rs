@@ -96,11 +96,13 @@ fn frames_that_are_cut_off_in_folders() {
     let folder = folder();
     folder.create("frames");
     // Noise, so that half of the bytes are half of the rows.
-    let code =
-        |x: u32, y: u32, channel: u32| (x * 7919 + y * 104_729 + channel * 31) * 2_654_435 % 65_000;
+    let code = |x: u32, y: u32, channel: u32| {
+        let mixed = u64::from(x * 7919 + y * 104_729 + channel * 31) * 2_654_435_761;
+        ((mixed >> 8) % 65_000) as u16
+    };
     for number in 0..3 {
         let picture = ImageBuffer::from_fn(64, 48, |x, y| {
-            Rgb([0, 1, 2].map(|channel| code(x, y, channel + number) as u16))
+            Rgb([0, 1, 2].map(|channel| code(x, y, channel + number)))
         });
         let path = folder.path(&format!("frames/f_{number}.png"));
         match number {
@@ -151,6 +153,7 @@ fn frames_of_which_nothing_is_left() {
         }
         folder.write(&format!("frames/{lost}"), &whole);
     }
+    std::fs::remove_dir_all(folder.path("out")).expect("removes");
     // A film of JPEG pictures whose first is nothing but its marker.
     folder.write(
         "in.mjpg",

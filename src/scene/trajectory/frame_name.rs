@@ -81,8 +81,10 @@ impl Naming {
         match least.filter(|least| are_whole && *least >= LEAST_STEP) {
             Some(LEAST_STEP_NS..) => Self::Stamps(1e9),
             Some(_) => Self::Stamps(1e6),
-            // All end alike, as with a size.
-            None if least == Some(0) => Self::inner(stems),
+            // They end alike, as with a size.
+            None if least == Some(0) && Self::inner(stems.clone()) != Self::Order => {
+                Self::inner(stems)
+            }
             None if numbers.last().is_some_and(|n| u32::try_from(*n).is_ok()) => Self::Numbers,
             None => Self::Order,
         }
@@ -221,7 +223,7 @@ mod tests {
         );
         assert_eq!(
             naming(&["1_a2.png", "2_a1.png", "3_a1.png"]),
-            Naming::Order,
+            Naming::Numbers,
             "two numbers differ"
         );
         assert_eq!(
