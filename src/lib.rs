@@ -20,7 +20,7 @@
 //! A backend knows no file format, and nothing below `cli` prints.
 //!
 //! What is meant for users of the library is named below; the modules are public for the program, the tests and the benchmarks alone,
-//! and may change. Features, on by default: `cli`, the program; `bench`, its `mixray bench`; `track`, its `mixray track`. Without them the library is
+//! and may change. Features, on by default: `cli`, the program; `bench`, its `mixray bench`; `track`, its `mixray track`; `start`, its `mixray new`. Without them the library is
 //! lean. Off by default: `preview`, the window of `mixray preview`.
 //!
 //! ```no_run
@@ -40,8 +40,13 @@ pub mod accel;
 #[cfg(feature = "bench")]
 #[doc(hidden)]
 pub mod bench;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod blender;
 #[doc(hidden)]
 pub mod camera;
+#[doc(hidden)]
+pub mod check;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;
@@ -51,6 +56,9 @@ pub mod cpu;
 mod decode;
 #[doc(hidden)]
 pub mod distortion;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod farm;
 #[doc(hidden)]
 pub mod files;
 #[doc(hidden)]
@@ -85,6 +93,9 @@ pub mod sequence;
 pub mod shared;
 #[doc(hidden)]
 pub mod stages;
+#[cfg(feature = "start")]
+#[doc(hidden)]
+pub mod start;
 #[cfg(feature = "track")]
 #[doc(hidden)]
 pub mod tracking;

@@ -27,6 +27,8 @@ segments = 24
 translation = [0, 0, -3]
 [render]
 backend = \"cpu\"
+[check]
+allow = [\"floating\", \"exposure\"]
 ";
 
 /// A scene, two films of it, frames of a video with poses, and frames of noise.

@@ -3,7 +3,10 @@
 mod architecture;
 mod backends;
 mod bench;
+mod blender;
+mod checking;
 mod cli;
+mod farm;
 mod faults;
 mod files;
 mod gltf;

@@ -25,6 +25,8 @@ profile = \"noise.toml\"
 [render]
 rays_per_pixel = 2
 backend = \"cpu\"
+[check]
+allow = [\"uncovered\", \"exposure\"]
 ";
 const MODEL: &str = r#"{ "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
 "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }], "buffers": [{ "uri": "model.bin", "byteLength": 36 }],

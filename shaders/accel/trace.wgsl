@@ -16,7 +16,12 @@ struct Ray {
     skip: u32,
 }
 
-var<workgroup> trace_stack: array<vec2<u32>, TRACE_STACK * WORKGROUP>;
+@if(shallow_trees)
+const STACK_LEVELS: u32 = SHALLOW_LEVELS;
+@if(!shallow_trees)
+const STACK_LEVELS: u32 = MOST_LEVELS;
+
+var<workgroup> trace_stack: array<vec2<u32>, STACK_LEVELS * WORKGROUP>;
 
 fn is_finite3(v: vec3<f32>) -> bool {
     return all((bitcast<vec3<u32>>(v) & vec3<u32>(0x7f800000u)) != vec3<u32>(0x7f800000u));
@@ -104,7 +109,7 @@ fn trace(ray: Ray, world: u32, any_hit: bool, thread: u32) -> Hit {
             let before = countOneBits(group.y & ~(0xffffffffu << slot) & 0xffu);
             let node = 5u * (node_base + group.x + before);
             group.y &= ~(1u << bit);
-            if group.y > 0x00ffffffu && depth < TRACE_STACK {
+            if group.y > 0x00ffffffu && depth < STACK_LEVELS {
                 trace_stack[depth * WORKGROUP + thread] = group;
                 depth += 1u;
             }

@@ -29,6 +29,8 @@ pub(super) struct CompressedBvh {
     pub(super) nodes: Vec<Node>,
     /// Three a triangle.
     pub(super) leaves: Vec<[f32; 4]>,
+    /// Nodes on the longest path.
+    pub(super) levels: u32,
     /// Around all triangles, enlarged; `None` without any.
     bounds: Option<Aabb>,
 }
@@ -85,6 +87,7 @@ impl CompressedBvh {
         CompressedBvh {
             nodes: vec![[[0; 4]; 5]],
             leaves: Vec::new(),
+            levels: 1,
             bounds: None,
         }
     }
@@ -104,8 +107,9 @@ impl CompressedBvh {
     ) -> Option<CompressedBvh> {
         let mut converted = bvh2_to_cwbvh(tree, MAX_LEAF_TRIANGLES, true, false);
         let nodes = &mut converted.nodes;
+        let levels = levels(nodes);
         // One more joins two trees.
-        if levels(nodes) >= MAX_LEVELS {
+        if levels >= MAX_LEVELS {
             return None;
         }
         // Box of each triangle in leaf order, enlarged as in the BVH2.
@@ -147,6 +151,7 @@ impl CompressedBvh {
         Some(CompressedBvh {
             nodes: bytemuck::cast_slice(nodes).to_vec(),
             leaves,
+            levels: levels as u32,
             bounds: node_boxes.first().copied(),
         })
     }

@@ -174,6 +174,13 @@ impl WorldBvh {
         self.compressed().map(|tree| &*tree.leaves)
     }
 
+    /// Nodes on the longest path of the GPU's tree.
+    pub fn gpu_levels(&self) -> u32 {
+        let [resting, moving] = self.compressed();
+        // One more joins two trees.
+        resting.levels.max(moving.levels) + u32::from(self.moving.is_some())
+    }
+
     fn compressed(&self) -> [&CompressedBvh; 2] {
         let resting = self.resting.compressed(Place::FIRST);
         let moving = match &self.moving {

@@ -11,8 +11,10 @@ shared! {
     const BOX_SLACK: f32 = 1.0 / (1 << 20) as f32;
     /// 2^-80: its inverse times any distance is finite. A flat box is wider than what such a component moves a ray.
     const LEAST_COMPONENT: f32 = f32::from_bits((127 - 80) << 23);
-    /// Levels of a tree on the GPU: each leaves at most one group of children waiting.
-    const TRACE_STACK: u32 = super::compressed::MAX_LEVELS as u32;
+    /// Most levels of a tree on the GPU: each leaves at most one group of children waiting.
+    const MOST_LEVELS: u32 = super::compressed::MAX_LEVELS as u32;
+    /// Levels of a tree that leaves room for twice as many waves: the stack is most of a kernel's workgroup memory.
+    pub const SHALLOW_LEVELS: u32 = 10;
 
     /// Where a ray met a triangle: `(1 - u - v) * v0 + u * v1 + v * v2`.
     #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 //!
 //! [`measure`] renders methods in turns against a [`Truth`] that [`reference`] makes; [`Report`] keeps the figures, and the other modules
 //! make tables, plots and a page of it or compare it with an earlier one. [`grow`] finds how the cost grows with the work, [`gpu_time`] where a
-//! GPU's time goes, and [`stress`] what breaks renderers.
+//! GPU's time goes, [`kernel_code`] what its compiler makes of the kernels, and [`stress`] what breaks renderers.
 
 mod against;
 mod chart;
@@ -11,6 +11,7 @@ mod docs;
 mod errors;
 mod fit;
 mod goal;
+mod gpu_code;
 mod gpu_time;
 mod growth;
 mod machine;
@@ -31,9 +32,13 @@ pub use docs::replace_section;
 pub use errors::{Errors, Figures, Truth};
 pub use fit::{Fit, Reach, cost_to_reach, log_log_fit, log_log_slope};
 pub use goal::{Aim, Goal};
+pub use gpu_code::{
+    Compiler, CompilerError, GpuCodeError, KernelCode, Variant, further_variants,
+    gpu_code_markdown, gpu_code_text, kernel_code, variant_of,
+};
 pub use gpu_time::{GpuTime, gpu_time, gpu_time_markdown, gpu_time_text};
 pub use growth::{Curve, Law, Point, grow, growth_csv, growth_markdown, growth_plot, growth_text};
-pub use machine::Machine;
+pub use machine::{Gpu, Machine};
 pub use measure::{MeasureError, Plan, Shot, measure, rmse_of};
 pub use page::page;
 pub use paper::{

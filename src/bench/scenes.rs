@@ -17,6 +17,8 @@ pub(super) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -
         path: PathBuf::new(),
         inputs: Vec::new(),
         stages: Stages::default(),
+        allowed: Vec::new(),
+        focal_length_mm: None,
         photo: None,
         camera,
         lens: Lens {

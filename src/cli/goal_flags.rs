@@ -18,7 +18,7 @@ pub(super) struct GoalFlags {
     /// The camera's noise: a file of `mixray noise calibrate`, or sigma^2 = A y + B in 8-bit code values y of the encoded picture
     /// [default: the profile of the scene's [noise]]
     #[arg(long, value_name = "NOISE.toml|A,B", requires = "stop_at")]
-    camera_noise: Option<String>,
+    pub camera_noise: Option<String>,
     /// Smooth what virtual objects change on real surfaces, biased: preview (if no name is given) for a few rays per pixel, final for
     /// pictures and videos that are to be kept
     #[arg(long, value_name = "NAME", num_args = 0..=1, require_equals = true, default_missing_value = "preview", value_parser = choice::<Filter>())]

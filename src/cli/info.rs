@@ -1,19 +1,27 @@
-//! `mixray info`: what this machine can render on.
+//! `mixray info`: what this machine can render on, or what a file is.
+
+use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Failure, Outcome, print};
+use super::{Failure, Outcome, file_info, print};
 use crate::gpu::{AdapterReport, list_adapters};
 
-/// Lists graphics adapters and their limits
+/// Tells what a file is and holds; without one lists graphics adapters and their limits
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// As JSON, with every limit
-    #[arg(long)]
+    /// Model, photograph, environment, film, trajectory, camera, noise profile or scene
+    file: Option<PathBuf>,
+    /// Adapters as JSON, with every limit
+    #[arg(long, conflicts_with = "file")]
     json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    if let Some(file) = &arguments.file {
+        print(&file_info::describe(file)?)?;
+        return Ok(Outcome::Done);
+    }
     let adapters = list_adapters();
     if arguments.json {
         let mut json = serde_json::to_string_pretty(&adapters)?;

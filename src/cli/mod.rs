@@ -6,15 +6,24 @@
 mod antialias;
 #[cfg(feature = "bench")]
 mod bench;
+mod bundle;
 mod cartoon;
+mod check;
 mod compare;
+mod export_blender;
+mod file_info;
+mod forwarded;
+mod frame_flags;
 mod goal_flags;
 mod info;
 mod interrupt;
 mod layers;
 mod merge;
 mod motion_blur;
+#[cfg(feature = "start")]
+mod new;
 mod noise;
+mod pick;
 mod picture_flags;
 mod pool;
 mod preview;
@@ -22,7 +31,9 @@ mod progress;
 mod render;
 mod scene_flags;
 mod sequence;
+mod sharpness;
 mod stage_device;
+mod submit;
 mod summary;
 mod terminal;
 mod threads;
@@ -34,7 +45,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::files;
 use crate::scene::Photo;
@@ -52,17 +63,25 @@ struct Arguments {
 enum Command {
     Render(render::Arguments),
     Preview(preview::Arguments),
+    Check(check::Arguments),
+    Pick(pick::Arguments),
     Sequence(sequence::Arguments),
     #[cfg(feature = "track")]
     Track(Box<track::Arguments>),
+    #[cfg(feature = "start")]
+    New(Box<new::Arguments>),
     Merge(merge::Arguments),
+    Submit(Box<submit::Arguments>),
+    Bundle(bundle::Arguments),
     #[cfg(feature = "bench")]
     Bench(Box<bench::Arguments>),
     Cartoon(cartoon::Arguments),
     Noise(noise::Arguments),
+    Sharpness(sharpness::Arguments),
     Antialias(antialias::Arguments),
     MotionBlur(motion_blur::Arguments),
     Compare(compare::Arguments),
+    ExportBlender(export_blender::Arguments),
     Info(info::Arguments),
 }
 
@@ -107,7 +126,9 @@ const MESA_NO_DEVICE_SELECTION: &str = "NODEVICE_SELECT";
 
 fn run_command() -> ExitCode {
     interrupt::survive_file_limits();
-    let arguments = Arguments::try_parse_from(words(std::env::args_os()))
+    let (arguments, matches) = Arguments::command()
+        .try_get_matches_from(words(std::env::args_os()))
+        .and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, matches)))
         .unwrap_or_else(|error| end_with_usage(error));
     // The window writes the scene that it reads.
     if !matches!(arguments.command, Command::Preview(_)) {
@@ -116,17 +137,30 @@ fn run_command() -> ExitCode {
     let result = match arguments.command {
         Command::Render(arguments) => arguments.check().and_then(render::run),
         Command::Preview(arguments) => preview::run(&arguments),
+        Command::Check(arguments) => all_threads().and_then(|()| check::run(&arguments)),
+        Command::Pick(arguments) => all_threads().and_then(|()| pick::run(&arguments)),
         Command::Sequence(arguments) => sequence::run(&arguments),
         #[cfg(feature = "track")]
         Command::Track(arguments) => track::run(&arguments),
+        #[cfg(feature = "start")]
+        Command::New(arguments) => new::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
+        Command::Submit(arguments) => {
+            let typed = matches.subcommand_matches("submit").unwrap_or(&matches);
+            all_threads().and_then(|()| submit::run(&arguments, typed))
+        }
+        Command::Bundle(arguments) => all_threads().and_then(|()| bundle::run(&arguments)),
         #[cfg(feature = "bench")]
         Command::Bench(arguments) => bench::run(*arguments),
         Command::Cartoon(arguments) => all_threads().and_then(|()| cartoon::run(&arguments)),
         Command::Noise(arguments) => all_threads().and_then(|()| noise::run(&arguments)),
+        Command::Sharpness(arguments) => all_threads().and_then(|()| sharpness::run(&arguments)),
         Command::Antialias(arguments) => all_threads().and_then(|()| antialias::run(&arguments)),
         Command::MotionBlur(arguments) => all_threads().and_then(|()| motion_blur::run(&arguments)),
         Command::Compare(arguments) => all_threads().and_then(|()| compare::run(&arguments)),
+        Command::ExportBlender(arguments) => {
+            all_threads().and_then(|()| export_blender::run(&arguments))
+        }
         Command::Info(arguments) => all_threads().and_then(|()| info::run(&arguments)),
     };
     match result {

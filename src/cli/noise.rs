@@ -9,10 +9,10 @@ use clap::{Args, Subcommand};
 use super::layers::LayerArguments;
 use super::stage_device::StageDevice;
 use super::values::within;
-use super::{Failure, Outcome, print, progress, say};
+use super::{Failure, Outcome, print, progress, read_photo, say};
 use crate::output::{Target, check_writable, write_composite, write_text};
 use crate::scene::{Choice, NoiseFit, NoiseMethod, NoiseProfile, NoiseSettings};
-use crate::stages::calibration::{calibrate, group_frames, report_html};
+use crate::stages::calibration::{calibrate, estimate_from_one, group_frames, report_html};
 use crate::stages::noise::{NoiseInput, NoiseStage};
 
 /// Measures a camera's noise, or gives it to a layer of another program
@@ -25,6 +25,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Calibrate(Calibrate),
+    Estimate(Estimate),
     Apply(Apply),
 }
 
@@ -49,6 +50,21 @@ struct Calibrate {
     /// No frames: white noise of sigma^2 = A y + B, y and sigma in 8-bit codes
     #[arg(long, value_name = "A,B", value_parser = fit, conflicts_with_all = ["frames", "report"], allow_hyphen_values = true)]
     from: Option<NoiseFit>,
+}
+
+/// Measures a camera's noise from the flat parts of one photograph
+///
+/// For photographs whose camera is not at hand. Texture without end (grass, gravel) passes for noise; several frames of one scene, with `calibrate`, tell them apart.
+#[derive(Debug, Args)]
+struct Estimate {
+    /// The photograph (PNG or JPEG as the camera stored it)
+    photo: PathBuf,
+    /// Profile to write
+    #[arg(short, long, value_name = "NOISE.toml")]
+    output: PathBuf,
+    /// Intensity bins, a power of two
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = bins)]
+    bins: usize,
 }
 
 fn bins(text: &str) -> Result<usize, String> {
@@ -133,6 +149,7 @@ fn texture_size(text: &str) -> Result<u32, String> {
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     match &arguments.command {
         Command::Calibrate(arguments) => run_calibrate(arguments),
+        Command::Estimate(arguments) => run_estimate(arguments),
         Command::Apply(arguments) => run_apply(arguments),
     }
 }
@@ -175,6 +192,18 @@ fn run_calibrate(arguments: &Calibrate) -> Result<Outcome, Failure> {
     if let Some(report) = &arguments.report {
         print(&format!("report  {}\n", report.display()))?;
     }
+    Ok(Outcome::Done)
+}
+
+fn run_estimate(arguments: &Estimate) -> Result<Outcome, Failure> {
+    check_writable(&arguments.output)?;
+    let photo = read_photo(&arguments.photo)?;
+    let name = arguments.photo.display().to_string();
+    let size = (photo.width, photo.height);
+    let profile = estimate_from_one(&photo.encoded, size, arguments.bins, &name)
+        .map_err(|problem| Failure(format!("{name}: {problem}")))?;
+    write_text(&arguments.output, &profile.to_toml())?;
+    print(&summary(&profile, &arguments.output))?;
     Ok(Outcome::Done)
 }
 

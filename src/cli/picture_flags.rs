@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::Failure;
 use super::goal_flags::GoalFlags;
+use super::progress::Engine;
 use super::scene_flags::SceneFlags;
 use super::threads::ThreadsFlag;
 use super::values::{choice, png_bits, rays_per_pixel};
@@ -49,6 +50,9 @@ pub(super) struct PictureFlags {
     /// Write times and counts as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
+    /// Tell how far the work is in lines that an engine reads on standard output: openjd_progress, openjd_status
+    #[arg(long, value_name = "ENGINE")]
+    pub progress: Option<Engine>,
     #[command(flatten)]
     pub goal: GoalFlags,
     #[command(flatten)]

@@ -1,13 +1,15 @@
-//! The progress bar: on stderr, and only where that is a terminal.
+//! The progress bar: on stderr, and only where that is a terminal; and lines on stdout for an engine that asks for them.
 
 use std::io::IsTerminal;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use clap::ValueEnum;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 
 use super::pool;
-use super::terminal::escaped;
+use super::terminal::{escaped, one_line, print};
 use crate::renderer::{Phase, Progress};
 
 /// What a render does, and the share of it that is done.
@@ -16,6 +18,38 @@ pub(super) struct Bar {
     unit: &'static str,
     /// Rays when they were last counted, and a second's worth of them in millions until then: they are counted pass by pass.
     rate: Mutex<(u64, f64)>,
+    lines: Option<Lines>,
+}
+
+/// Who reads lines of progress.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Engine {
+    /// Open Job Description.
+    Openjd,
+}
+
+/// Lines that an engine reads: whole percents, and what is done, each once.
+#[derive(Default)]
+struct Lines(Mutex<(Option<u64>, String)>);
+
+impl Lines {
+    fn tell(&self, share_done: f64, doing: &str) {
+        let Ok(mut told) = self.0.lock() else { return };
+        let mut text = String::new();
+        if !doing.is_empty() && told.1 != doing {
+            doing.clone_into(&mut told.1);
+            text += &format!("openjd_status: {}\n", one_line(doing));
+        }
+        let percent = (100.0 * share_done.clamp(0.0, 1.0)) as u64;
+        if told.0.is_none_or(|before| before < percent) {
+            told.0 = Some(percent);
+            text += &format!("openjd_progress: {percent}\n");
+        }
+        if !text.is_empty() {
+            // Whoever no longer listens needs no progress.
+            let _ = print(&text);
+        }
+    }
 }
 
 /// Of the bar's length.
@@ -35,10 +69,20 @@ impl Bar {
             bar,
             unit,
             rate: Mutex::default(),
+            lines: None,
         }
     }
 
+    /// Tells an engine as well.
+    pub(super) fn told_to(mut self, engine: Option<Engine>) -> Self {
+        self.lines = engine.map(|Engine::Openjd| Lines::default());
+        self
+    }
+
     pub(super) fn hear(&self, progress: &Progress) {
+        if let Some(lines) = &self.lines {
+            lines.tell(progress.share_done, progress.phase.name());
+        }
         let Some(bar) = &self.bar else { return };
         bar.set_prefix(progress.phase.name());
         bar.set_position((progress.share_done * PARTS as f64) as u64);
@@ -84,29 +128,52 @@ impl Drop for Bar {
 }
 
 /// Steps of a longer job, each with a line of what is going on.
-pub(super) struct Steps(Option<ProgressBar>);
+pub(super) struct Steps {
+    bar: Option<ProgressBar>,
+    lines: Option<Lines>,
+    /// Done, and to do.
+    count: (AtomicU64, AtomicU64),
+}
 
 impl Steps {
     pub(super) fn new(count: u64) -> Self {
-        if !std::io::stderr().is_terminal() {
-            return Self(None);
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(count);
+            set_template(&bar, "{bar:24} {pos}/{len}, {elapsed}: {wide_msg}");
+            tick(&bar, 500);
+            bar
+        });
+        Self {
+            bar,
+            lines: None,
+            count: (AtomicU64::new(0), AtomicU64::new(count)),
         }
-        let bar = ProgressBar::new(count);
-        set_template(&bar, "{bar:24} {pos}/{len}, {elapsed}: {wide_msg}");
-        tick(&bar, 500);
-        Self(Some(bar))
+    }
+
+    /// Tells an engine as well.
+    pub(super) fn told_to(mut self, engine: Option<Engine>) -> Self {
+        self.lines = engine.map(|Engine::Openjd| Lines::default());
+        self
+    }
+
+    fn tell(&self, doing: &str) {
+        if let Some(lines) = &self.lines {
+            let [done, count] = [&self.count.0, &self.count.1].map(|n| n.load(Ordering::Relaxed));
+            lines.tell(done as f64 / count.max(1) as f64, doing);
+        }
     }
 
     /// How many steps there are.
     pub(super) fn expect(&self, count: u64) {
-        if let Some(bar) = &self.0 {
+        self.count.1.store(count, Ordering::Relaxed);
+        if let Some(bar) = &self.bar {
             bar.set_length(count);
         }
     }
 
     /// Says something while the bar steps aside.
     pub(super) fn aside(&self, speak: impl FnOnce()) {
-        match &self.0 {
+        match &self.bar {
             Some(bar) => bar.suspend(speak),
             None => speak(),
         }
@@ -114,20 +181,23 @@ impl Steps {
 
     /// Something within a step.
     pub(super) fn say(&self, message: &str) {
-        if let Some(bar) = &self.0 {
+        self.tell(message);
+        if let Some(bar) = &self.bar {
             bar.set_message(escaped(message));
         }
     }
 
     /// A step ends.
     pub(super) fn step(&self) {
-        if let Some(bar) = &self.0 {
+        self.count.0.fetch_add(1, Ordering::Relaxed);
+        self.tell("");
+        if let Some(bar) = &self.bar {
             bar.inc(1);
         }
     }
 
     pub(super) fn clear(&self) {
-        if let Some(bar) = &self.0 {
+        if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
     }

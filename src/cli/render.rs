@@ -1,17 +1,18 @@
 //! `mixray render`: a scene file to pictures.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
 
 use super::picture_flags::PictureFlags;
 use super::progress::Bar;
-use super::values::whole_range;
+use super::values::part;
 use super::{Failure, Outcome, interrupt, print, say, summary};
+use crate::check::{self, Extent};
 use crate::output::{
-    ExrLayer, ExrLayers, FilmNote, Format, Metadata, PngBits, Target, check_writable, write_exr,
-    write_film, write_png, write_text,
+    ExrLayer, ExrLayers, FilmNote, Format, Metadata, PngBits, Target, check_writable, read_film,
+    write_exr, write_film, write_png, write_text,
 };
 use crate::renderer::{
     Budget, Delivered, Goal, Progress, Renderer, RendererOptions, Stats, Watcher,
@@ -36,9 +37,12 @@ pub(super) struct Arguments {
     layers: Vec<ExrLayer>,
     #[command(flatten)]
     flags: PictureFlags,
-    /// Render only these of each pixel's rays, FROM to TO - 1, into an .exr that `mixray merge` puts together with the others
-    #[arg(long, value_name = "FROM..TO", value_parser = whole_range, conflicts_with_all = ["target_error", "stop_at", "filter"])]
+    /// Render only these of each pixel's rays, FROM to TO - 1 (or FROM-LAST), into an .exr that `mixray merge` puts together with the others
+    #[arg(long, value_name = "FROM..TO", value_parser = part, conflicts_with_all = ["target_error", "stop_at", "filter"])]
     range: Option<(u32, u32)>,
+    /// With --range: keep the part that is there, if it is this one and whole; a part of another render is an error
+    #[arg(long, requires = "range")]
+    resume: bool,
     /// Frame number of a video: with [noise], every frame has its own
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
@@ -54,6 +58,7 @@ pub(super) struct Job {
     overrides: Overrides,
     frame: u32,
     range: Option<(u32, u32)>,
+    resume: bool,
     goal: Option<Goal>,
     layers: Vec<ExrLayer>,
 }
@@ -78,6 +83,10 @@ impl Arguments {
                 "--range wants an .exr to write (-o part.exr): other pictures do not keep the film";
             return Err(Failure(message.to_owned()));
         }
+        if self.resume && targets.len() != 1 {
+            let message = "--resume wants one output, the part's .exr (-o part.exr): pictures come from `mixray merge`";
+            return Err(Failure(message.to_owned()));
+        }
         let goal = self.flags.goal.goal(self.flags.rpp)?;
         Ok(Job {
             goal,
@@ -92,6 +101,7 @@ impl Arguments {
             flags: self.flags,
             frame: self.frame,
             range: self.range,
+            resume: self.resume,
         })
     }
 }
@@ -103,7 +113,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         Some(_) => "scrambles",
         None => "rays per pixel",
     };
-    let bar = Bar::new("reading the scene", unit);
+    let bar = Bar::new("reading the scene", unit).told_to(job.flags.progress);
     let mut scene = job.flags.scene.load(&job.scene)?;
     scene.settings.apply(&job.overrides);
     let goal = job.goal.map(|goal| goal.of(&scene)).transpose()?;
@@ -136,11 +146,30 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let watcher = Watcher::none().heard_by(&hear);
     let mut renderer = Renderer::new(scene, options, &watcher)?;
     let without = renderer.without();
+    if let (true, Some(range), [target]) = (job.resume, job.range, targets.as_slice())
+        && is_kept(target.path(), &renderer, range)?
+    {
+        drop(bar);
+        let (from, to) = range;
+        print(&format!(
+            "picture {} kept (rays {from}..{to} per pixel)\n",
+            target.path().display()
+        ))?;
+        return Ok(Outcome::Done);
+    }
     let estimator = renderer.scene().settings.estimator;
     let on_gpu = renderer.gpu_device().is_some();
     for (saving, reason) in without.idle(estimator, on_gpu, goal.as_ref()) {
         bar.aside(|| say_idle(saving, reason));
     }
+    let mut findings = check::scene(renderer.scene(), Extent::Still);
+    let fitted_ev = renderer.fitted_exposure_ev();
+    findings.extend(check::exposure(renderer.scene(), fitted_ev));
+    bar.aside(|| {
+        for finding in &findings {
+            say("warning", &finding.to_string());
+        }
+    });
     let goal = goal.map(|goal| goal.without(without));
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
@@ -188,6 +217,26 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     } else {
         Outcome::Done
     })
+}
+
+/// The part is there: of this render, with all of these rays. One that was ended early is not.
+fn is_kept(path: &Path, renderer: &Renderer, range: (u32, u32)) -> Result<bool, Failure> {
+    if !path.exists() {
+        return Ok(false);
+    }
+    let (_, found) = read_film(path)?;
+    let without = renderer.without().of_films(renderer.gpu_device().is_some());
+    let wanted = FilmNote::new(renderer.scene(), range, without);
+    let ((from, to), (first, end)) = (range, found.range);
+    let problem = match found.mismatch(&wanted) {
+        None if first == from && end <= to => return Ok(end == to),
+        None => format!("rays {first}..{end} where {from}..{to} are rendered"),
+        Some(problem) => problem,
+    };
+    Err(Failure(format!(
+        "{}: holds another part: {problem}; expected this part or no file; name another output, or remove it",
+        path.display()
+    )))
 }
 
 /// `film_range`: EXR files keep the film's sums, which are of these rays per pixel. Gives [`Delivered::moved`].

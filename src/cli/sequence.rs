@@ -2,20 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
+use super::frame_flags::{FrameFlags, positive};
 use super::picture_flags::PictureFlags;
 use super::progress::Steps;
 use super::render::say_idle;
 use super::terminal::print_aside;
-use super::values::whole_range;
+use super::values::part;
 use super::{Failure, Outcome, interrupt, print, say};
 use crate::output::{check_writable, write_text};
 use crate::renderer::Watcher;
-use crate::scene::Overrides;
 use crate::scene::trajectory::FORMATS;
 use crate::sequence::{Event, RenderedSequence, SequenceOptions, check_poses, render_sequence};
-use crate::video::Matrix;
 
 /// Renders a scene's virtual objects into the frames of a video
 ///
@@ -24,35 +23,14 @@ use crate::video::Matrix;
 pub(super) struct Arguments {
     /// Scene file (TOML); its photograph is not needed, nor are its intrinsics if the trajectory brings them
     scene: PathBuf,
-    /// Folder of pictures, .y4m file, file of JPEG pictures one after the other, or - for Y4M on standard input
-    #[arg(long, value_name = "PATH")]
-    frames: Option<PathBuf>,
     #[arg(long, value_name = "FILE", help = format!("Poses: {FORMATS}"))]
     trajectory: PathBuf,
-    /// Calibration of OpenCV, ROS or Kalibr (YAML) in place of the intrinsics of trajectory and scene
-    #[arg(long, value_name = "FILE")]
-    intrinsics: Option<PathBuf>,
     /// Folder for PNG files, .y4m file, or - for Y4M on standard output
     #[arg(short, long, value_name = "PATH", required_unless_present = "check")]
     output: Option<PathBuf>,
-    /// Only the frames with these numbers, FROM to TO - 1
-    #[arg(long, value_name = "FROM..TO", value_parser = whole_range)]
-    range: Option<(u32, u32)>,
-    /// Numbers may be missing among the frames of a folder
-    #[arg(long)]
-    allow_gaps: bool,
-    /// Frames of which a part is lost: end with an error, or name them and let what is there of them pass
-    #[arg(long, value_name = "WHAT", value_enum, default_value_t = Damaged::Refuse)]
-    damaged_frames: Damaged,
-    /// Y'CbCr of films [default: 709 from 720 lines on, else 601]
-    #[arg(long, value_name = "MATRIX", value_parser = matrix)]
-    matrix: Option<Matrix>,
-    /// Frames a second, where neither the frames nor the trajectory tell
-    #[arg(long, value_name = "RATE", value_parser = positive)]
-    fps: Option<f64>,
-    /// Focus distance in metres over the range, from the first to the last frame, at a constant rate in 1/m
-    #[arg(long, value_name = "FROM..TO", value_parser = focus_pull)]
-    focus_pull: Option<(f64, f64)>,
+    /// Of the range render only these, each as the whole range has it: FROM..TO (to TO - 1), or FROM-LAST
+    #[arg(long, value_name = "FROM..TO", value_parser = part)]
+    part: Option<(u32, u32)>,
     /// Replace frames of another render
     #[arg(long)]
     overwrite: bool,
@@ -63,13 +41,9 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "PX", default_value_t = 2.0, value_parser = positive)]
     max_error: f64,
     #[command(flatten)]
+    frames: FrameFlags,
+    #[command(flatten)]
     flags: PictureFlags,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Damaged {
-    Refuse,
-    Pass,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
@@ -82,30 +56,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 
 impl Arguments {
     fn options(&self) -> Result<SequenceOptions, Failure> {
-        let goal = self.flags.goal.goal(self.flags.rpp)?;
+        let output = self.output.clone().unwrap_or_else(|| "-".into());
+        let files = (self.scene.clone(), self.trajectory.clone());
         Ok(SequenceOptions {
-            scene: self.scene.clone(),
-            overrides: Overrides {
-                // With a goal it is a limit, and not what the pilot plans for.
-                rays_per_pixel: self.flags.rpp.filter(|_| goal.is_none()),
-                ..self.flags.overrides()
-            },
-            goal,
-            filter: self.flags.goal.filter,
-            without: self.flags.without(),
-            frames: self.frames.clone(),
-            trajectory: self.trajectory.clone(),
-            intrinsics: self.intrinsics.clone(),
-            output: self.output.clone().unwrap_or_else(|| "-".into()),
-            range: self.range,
-            allow_gaps: self.allow_gaps,
-            pass_damaged_frames: self.damaged_frames == Damaged::Pass,
-            matrix: self.matrix,
-            frames_per_second: self.fps,
-            focus_pull_m: self.focus_pull,
+            part: self.part,
             overwrite: self.overwrite,
-            png_bits: self.flags.png_bits,
-            sandbox: self.flags.scene.sandbox,
+            ..self.frames.options(files, output, &self.flags)?
         })
     }
 }
@@ -126,7 +82,13 @@ fn render(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
-    let steps = Steps::new(0);
+    let to_engine = arguments.flags.progress;
+    if to_engine.is_some() && options.output == Path::new("-") {
+        let message =
+            "--progress and -o - both want standard output; expected one of them; write a file";
+        return Err(Failure(message.to_owned()));
+    }
+    let steps = Steps::new(0).told_to(to_engine);
     let hear = |event: &Event<'_>| match event {
         Event::Plan { frames } => steps.expect(frames.unwrap_or(0) as u64),
         Event::Begins { label, .. } => steps.say(label),
@@ -159,35 +121,11 @@ fn render(arguments: &Arguments) -> Result<Outcome, Failure> {
     })
 }
 
-fn tell(event: &Event<'_>) {
+pub(super) fn tell(event: &Event<'_>) {
     match event {
         Event::Warning(text) => say("warning", text),
         Event::Note(text) => say("note", text),
         Event::Idle { saving, reason } => say_idle(saving, reason),
         Event::Plan { .. } | Event::Begins { .. } | Event::Ends { .. } => {}
-    }
-}
-
-fn matrix(text: &str) -> Result<Matrix, &'static str> {
-    match text {
-        "601" => Ok(Matrix::Bt601),
-        "709" => Ok(Matrix::Bt709),
-        _ => Err("expected 601 or 709"),
-    }
-}
-
-fn positive(text: &str) -> Result<f64, &'static str> {
-    match text.parse::<f64>() {
-        Ok(x) if x > 0.0 && x <= 1e6 => Ok(x),
-        _ => Err("expected a number above 0, at most 1000000"),
-    }
-}
-
-fn focus_pull(text: &str) -> Result<(f64, f64), &'static str> {
-    let ends = text.split_once("..");
-    let metres = |text: &str| text.parse::<f64>().ok().filter(|x| *x > 0.0);
-    match ends.and_then(|(from, to)| Some((metres(from)?, metres(to)?))) {
-        Some(ends) => Ok(ends),
-        None => Err("expected FROM..TO, two distances above 0 in metres, such as 0.4..2.5"),
     }
 }

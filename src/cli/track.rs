@@ -201,7 +201,7 @@ fn flatness(text: &str) -> Result<Flatness, &'static str> {
 }
 
 /// Metres of "40mm", "4cm", "0.04m" or "1.5in".
-fn length(text: &str) -> Result<f64, &'static str> {
+pub(super) fn length(text: &str) -> Result<f64, &'static str> {
     let units = [("mm", 1e-3), ("cm", 1e-2), ("in", 0.0254), ("m", 1.0)];
     let parsed = units.into_iter().find_map(|(unit, metres)| {
         let number = text.strip_suffix(unit)?.trim().parse::<f64>().ok()?;

@@ -54,6 +54,22 @@ pub(super) fn whole_range(text: &str) -> Result<(u32, u32), &'static str> {
     }
 }
 
+/// "16..32", or as engines of farms write it "16-31".
+pub(super) fn part(text: &str) -> Result<(u32, u32), &'static str> {
+    let numbers = |(a, b): (&str, &str)| Some((a.parse::<u32>().ok()?, b.parse::<u32>().ok()?));
+    let parsed = if let Some(ends) = text.split_once("..") {
+        numbers(ends)
+    } else if let Some(ends) = text.split_once('-') {
+        numbers(ends).and_then(|(from, last)| Some((from, last.checked_add(1)?)))
+    } else {
+        numbers((text, text)).and_then(|(from, last)| Some((from, last.checked_add(1)?)))
+    };
+    match parsed {
+        Some((from, to)) if from < to => Ok((from, to)),
+        _ => Err("expected FROM..TO with the first below the second, FROM-LAST, or one number"),
+    }
+}
+
 /// "0.01,0.2", or the name of a file.
 pub(super) fn camera_noise(text: &str) -> Result<CameraNoise, Failure> {
     let parse = |part: &str| part.trim().parse::<f64>().ok();
@@ -71,6 +87,21 @@ pub(super) fn camera_noise(text: &str) -> Result<CameraNoise, Failure> {
             let profile = NoiseProfile::read(Path::new(text))
                 .map_err(|problem| Failure(format!("{text}: {problem}")))?;
             Ok(CameraNoise { fit: profile.fit })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_read_in_every_form() {
+        for (text, ends) in [("16..32", (16, 32)), ("16-31", (16, 32)), ("16", (16, 17))] {
+            assert_eq!(part(text), Ok(ends), "{text}");
+        }
+        for text in ["", "3..3", "4-3", "1,2", "4294967295", "-1", "1-3-5"] {
+            assert!(part(text).is_err(), "{text}");
         }
     }
 }

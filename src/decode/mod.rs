@@ -10,6 +10,7 @@ mod file;
 mod guard;
 mod hdr;
 mod jpeg;
+mod kind;
 mod png;
 mod profile;
 mod tags;
@@ -21,6 +22,7 @@ pub(crate) use file::{
     MAX_PICTURE_BYTES, MAX_POSES_BYTES, MAX_TEXT_BYTES, read_file, read_stream, read_text,
 };
 pub(crate) use jpeg::split_jpegs;
+pub(crate) use kind::{FileKind, film_kind, kind_of};
 pub use profile::ColourProfile;
 pub use tags::Tags;
 pub(crate) use tags::{turned, turned_size};

@@ -97,7 +97,7 @@ pub(crate) fn output(path: &Path) -> Result<(), Conflict> {
 ///
 /// # Errors
 /// As [`output`].
-#[cfg(feature = "bench")]
+#[cfg(any(feature = "bench", feature = "start"))]
 pub(crate) fn own(path: &Path) -> Result<(), Conflict> {
     output(path)?;
     with(|registry| registry.own(&resolved(path)));

@@ -119,7 +119,7 @@ impl Registry {
         Ok(())
     }
 
-    #[cfg(feature = "bench")]
+    #[cfg(any(feature = "bench", feature = "start"))]
     pub(super) fn own(&mut self, path: &Path) {
         if let Some(index) = self.outputs.find(Some(path), None) {
             self.output_notes[index].own = true;

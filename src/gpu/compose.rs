@@ -84,6 +84,8 @@ features! {
     facets,
     /// Virtual objects show the photograph behind them.
     backdrop,
+    /// No tree has more than [`SHALLOW_LEVELS`](accel::trace::SHALLOW_LEVELS) levels.
+    shallow_trees,
 }
 
 impl Features {
@@ -96,6 +98,7 @@ impl Features {
         Self {
             paper: needed.paper,
             sharing: !needed.paper,
+            shallow_trees: false,
             ..Self::ALL
         }
     }
@@ -135,6 +138,9 @@ impl Features {
             panes: scene.frame.flags & packed::FRAME_PANES != 0,
             facets: !scene.facet_tables.is_empty(),
             backdrop: scene.frame.flags & packed::FRAME_BACKDROP != 0,
+            shallow_trees: [&scene.real_bvh, &scene.virtual_bvh]
+                .iter()
+                .all(|tree| tree.gpu_levels() <= accel::trace::SHALLOW_LEVELS),
         }
     }
 }

@@ -18,7 +18,8 @@ pub mod wavefront;
 pub use buffers::{Changed, SceneBuffers, SceneParts};
 pub use compose::{Composer, Features};
 pub use device::{AdapterChoice, AdapterReport, GpuDevice, list_adapters};
-pub use profile::KernelSeconds;
+pub use photons::PHOTON_KERNEL;
+pub use profile::{KERNELS, KernelSeconds};
 pub use wavefront::GpuBackend;
 
 /// What can go wrong on the GPU, in the words the user gets.

@@ -41,6 +41,9 @@ shared! {
     const PHOTON_COUNTERS: u32 = 3;
 }
 
+/// The entry point.
+pub const PHOTON_KERNEL: &str = "kernel_photons";
+
 const COUNTERS_BYTES: u64 = 4 * PHOTON_COUNTERS as u64;
 const SPLAT_BYTES: u64 = size_of::<ListedSplat>() as u64;
 /// Photons of the first submission, and of any.
@@ -71,9 +74,8 @@ impl Photons {
         scene: &SceneBuffers,
     ) -> Result<Self, GpuError> {
         use wgpu::BufferUsages as Usage;
-        let entry_point = "kernel_photons";
-        let wgsl = composer.compose("gpu::photons", entry_point, features)?;
-        let kernel = Kernel::new(gpu, entry_point, &wgsl)?;
+        let wgsl = composer.compose("gpu::photons", PHOTON_KERNEL, features)?;
+        let kernel = Kernel::new(gpu, PHOTON_KERNEL, &wgsl)?;
         let make = |label, size, usage| {
             gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),

@@ -173,6 +173,15 @@ fn folder_and_name(target: &Path) -> Result<(PathBuf, OsString), OutputError> {
     Ok((folder.into(), name.into()))
 }
 
+/// An empty file beside `path`, to be renamed to it.
+///
+/// # Errors
+/// `path` cannot be written.
+#[cfg(feature = "cli")]
+pub(crate) fn new_beside(path: &Path) -> Result<tempfile::NamedTempFile, OutputError> {
+    Ok(temporary_beside(path)?.0)
+}
+
 /// An empty temporary file in the folder of `path`, and the path to rename it to (links resolved, so that they stay links).
 fn temporary_beside(path: &Path) -> Result<(tempfile::NamedTempFile, PathBuf), OutputError> {
     let target = match path.metadata() {

@@ -52,6 +52,8 @@ pub fn test_scene() -> Scene {
         },
         inputs: Vec::new(),
         stages: Stages::default(),
+        allowed: Vec::new(),
+        focal_length_mm: None,
         warnings: Vec::new(),
     }
 }

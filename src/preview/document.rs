@@ -2,13 +2,16 @@
 
 use std::path::Path;
 
-use glam::{DQuat, DVec3};
+use glam::{DMat4, DQuat, DVec3};
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 use super::composition::{
     CameraPose, Composition, EnvironmentForm, LensForm, Opening, Placement, Rotation,
 };
 use crate::scene::{Aperture, Exposure, Scene, Side};
+
+/// Keys that place an object in place of numbers.
+const PLACING_KEYS: [&str; 4] = ["rest_on", "pixel", "size_m", "look_at"];
 
 /// A scene file's text that is valid TOML.
 #[derive(Clone, Debug)]
@@ -35,7 +38,11 @@ impl Document {
             };
             let table = self.entry(key, *index);
             *index += 1;
-            table.map_or(Placement::IDENTITY, read_placement)
+            match table {
+                Some(table) if is_placed(table) => Placement::of(object.world_from_object),
+                Some(table) => read_placement(table),
+                None => Placement::IDENTITY,
+            }
         });
         let objects = objects.collect();
         Composition {
@@ -298,6 +305,21 @@ impl Placement {
         rotation: Rotation::EulerDeg(DVec3::ZERO),
         scale: DVec3::ONE,
     };
+
+    /// Of a transform without shear.
+    fn of(world_from_object: DMat4) -> Self {
+        let (scale, rotation, translation) = world_from_object.to_scale_rotation_translation();
+        Self {
+            translation,
+            rotation: Rotation::Quaternion(rotation),
+            scale,
+        }
+    }
+}
+
+/// Its transform follows from what is around it.
+fn is_placed(table: &dyn TableLike) -> bool {
+    PLACING_KEYS.iter().any(|key| table.contains_key(key))
 }
 
 fn read_placement(table: &dyn TableLike) -> Placement {
@@ -318,6 +340,14 @@ fn read_placement(table: &dyn TableLike) -> Placement {
 }
 
 fn write_placement(table: &mut dyn TableLike, was: &Placement, is: &Placement) {
+    // Numbers take the place of what placed it, all of them.
+    let was = match is_placed(table) {
+        true => &Placement::IDENTITY,
+        false => was,
+    };
+    for key in PLACING_KEYS {
+        table.remove(key);
+    }
     if was.translation != is.translation {
         set_vector(table, "translation", is.translation);
     }

@@ -25,6 +25,8 @@ const FIRST_ALBEDO: f32 = 0.5;
 const GRID_PITCH_PX: usize = 4;
 const GRID_RAYS: u32 = 32;
 const ROUNDS: usize = 2;
+/// Grid pitch of an exposure that is only told.
+const ROUGH_PITCH_PX: usize = 24;
 /// Half-width of the spreading filter in grid points; relative depth and normal tolerances.
 const FILTER_RADIUS: isize = 3;
 const DEPTH_TOLERANCE: f32 = 0.02;
@@ -41,14 +43,24 @@ struct Seen {
     object: u32,
 }
 
+impl Seen {
+    const NOTHING: Self = Self {
+        depth_m: 0.0,
+        position: Vec3::ZERO,
+        normal: Vec3::ZERO,
+        object: NONE,
+    };
+}
+
 /// Fills `scene.photo_albedo` so that the converged Ir reproduces the photograph; the share of its pixels whose albedo had to be limited, because the
 /// proxy's light and the photograph differ by more than any surface does.
 pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo, watcher: &Watcher<'_>) -> f64 {
-    let seen = first_surfaces(scene, |flags| flags & MATERIAL_PHOTO_ALBEDO != 0);
+    let seen = first_surfaces(scene, 1, |flags| flags & MATERIAL_PHOTO_ALBEDO != 0);
     scene.photo_albedo = unknown_albedo(scene, &seen);
     let pixels = seen.len();
     let scale = scene.frame.exposure_scale;
-    let meter = Meter::begin(watcher, Phase::Albedo, ROUNDS as u64 * grid_points(scene));
+    let points = grid_points(scene, GRID_PITCH_PX);
+    let meter = Meter::begin(watcher, Phase::Albedo, ROUNDS as u64 * points);
     let mut limited = 0;
     for _ in 0..ROUNDS {
         limited = 0;
@@ -80,10 +92,26 @@ pub fn fit_exposure_ev(
     photo: &Photo,
     watcher: &Watcher<'_>,
 ) -> Option<f64> {
-    let seen = first_surfaces(scene, |_| true);
-    scene.photo_albedo = unknown_albedo(scene, &seen);
-    let meter = Meter::begin(watcher, Phase::Exposure, grid_points(scene));
-    let grid = trace_grid(scene, &seen, &meter);
+    let seen = first_surfaces(scene, 1, |_| true);
+    fit_exposure_on(scene, photo, &seen, GRID_PITCH_PX, watcher)
+}
+
+/// [`fit_exposure_ev`] from so few rays that it costs next to nothing.
+pub fn roughly_fit_exposure_ev(scene: &mut PackedScene, photo: &Photo) -> Option<f64> {
+    let seen = first_surfaces(scene, ROUGH_PITCH_PX, |_| true);
+    fit_exposure_on(scene, photo, &seen, ROUGH_PITCH_PX, &Watcher::none())
+}
+
+fn fit_exposure_on(
+    scene: &mut PackedScene,
+    photo: &Photo,
+    seen: &[Seen],
+    pitch_px: usize,
+    watcher: &Watcher<'_>,
+) -> Option<f64> {
+    scene.photo_albedo = unknown_albedo(scene, seen);
+    let meter = Meter::begin(watcher, Phase::Exposure, grid_points(scene, pitch_px));
+    let grid = trace_grid(scene, seen, pitch_px, &meter);
     meter.end();
     let width = scene.frame.width as usize;
     let mut ratios: Vec<f64> = grid
@@ -104,7 +132,12 @@ pub fn fit_exposure_ev(
     Some(ratio.log2())
 }
 
-fn first_surfaces(scene: &PackedScene, wanted: impl Fn(u32) -> bool + Sync) -> Vec<Seen> {
+/// Of every pixel that a grid of that pitch may ask for; of the others nothing.
+fn first_surfaces(
+    scene: &PackedScene,
+    pitch_px: usize,
+    wanted: impl Fn(u32) -> bool + Sync,
+) -> Vec<Seen> {
     let pinhole = Frame {
         aperture_radius: 0.0,
         ..scene.frame
@@ -113,10 +146,12 @@ fn first_surfaces(scene: &PackedScene, wanted: impl Fn(u32) -> bool + Sync) -> V
     (0..scene.frame.width * scene.frame.height)
         .into_par_iter()
         .map(|pixel| {
-            let (x, y) = (
-                (pixel % pinhole.width) as f32 + 0.5,
-                (pixel / pinhole.width) as f32 + 0.5,
-            );
+            let (column, row) = (pixel % pinhole.width, pixel / pinhole.width);
+            let on_grid = |at: u32| at as usize % pitch_px == pitch_px / 2;
+            if !(on_grid(column) && on_grid(row)) {
+                return Seen::NOTHING;
+            }
+            let (x, y) = (column as f32 + 0.5, row as f32 + 0.5);
             let ray = camera_ray(&pinhole, x, y, 0.5, 0.5);
             let hit = scene.real_bvh.closest(&Ray {
                 origin: ray.origin,
@@ -126,12 +161,7 @@ fn first_surfaces(scene: &PackedScene, wanted: impl Fn(u32) -> bool + Sync) -> V
                 skip: NONE,
             });
             if hit.triangle == NONE || !wanted(material_flags(scene, hit)) {
-                return Seen {
-                    depth_m: 0.0,
-                    position: Vec3::ZERO,
-                    normal: Vec3::ZERO,
-                    object: NONE,
-                };
+                return Seen::NOTHING;
             }
             Seen {
                 depth_m: hit.t * -ray.direction.dot(back),
@@ -169,18 +199,18 @@ struct Grid {
     points: Vec<Option<GridPoint>>,
 }
 
-fn grid_size(scene: &PackedScene) -> (usize, usize) {
-    let points = |pixels: u32| (pixels as usize).div_ceil(GRID_PITCH_PX);
+fn grid_size(scene: &PackedScene, pitch_px: usize) -> (usize, usize) {
+    let points = |pixels: u32| (pixels as usize).div_ceil(pitch_px);
     (points(scene.frame.width), points(scene.frame.height))
 }
 
-fn grid_points(scene: &PackedScene) -> u64 {
-    let (width, height) = grid_size(scene);
+fn grid_points(scene: &PackedScene, pitch_px: usize) -> u64 {
+    let (width, height) = grid_size(scene, pitch_px);
     width as u64 * height as u64
 }
 
 /// Path traces the real world on the grid, with a pinhole.
-fn trace_grid(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) -> Grid {
+fn trace_grid(scene: &mut PackedScene, seen: &[Seen], pitch_px: usize, meter: &Meter<'_>) -> Grid {
     let kept = scene.frame;
     scene.frame.aperture_radius = 0.0;
     // Savings left out do not change the estimate, whichever came first.
@@ -189,14 +219,14 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) -> Grid
     scene.frame.rays_total = GRID_RAYS;
     scene.frame.estimator = ESTIMATOR_DIRECT;
     let (frame_width, frame_height) = (kept.width as usize, kept.height as usize);
-    let (width, height) = grid_size(scene);
+    let (width, height) = grid_size(scene, pitch_px);
     let shared: &PackedScene = scene;
     let points = (0..width * height)
         .into_par_iter()
         .map(|i| {
             meter.add(1);
-            let x = ((i % width) * GRID_PITCH_PX + GRID_PITCH_PX / 2).min(frame_width - 1);
-            let y = ((i / width) * GRID_PITCH_PX + GRID_PITCH_PX / 2).min(frame_height - 1);
+            let x = ((i % width) * pitch_px + pitch_px / 2).min(frame_width - 1);
+            let y = ((i / width) * pitch_px + pitch_px / 2).min(frame_height - 1);
             let pixel = y * frame_width + x;
             if seen[pixel].depth_m <= 0.0 {
                 return None;
@@ -226,7 +256,7 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) -> Grid
 
 /// E / pi of every pixel with a wanted surface: the grid's estimates, weighted by distance, depth and normal.
 fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) -> Vec<Vec3> {
-    let grid = trace_grid(scene, seen, meter);
+    let grid = trace_grid(scene, seen, GRID_PITCH_PX, meter);
     let width = scene.frame.width as usize;
     seen.par_iter()
         .enumerate()

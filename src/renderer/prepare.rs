@@ -101,6 +101,16 @@ impl Renderer {
         }
     }
 
+    /// The `exposure_ev` that "auto" would take, from a few rays; `None`: there is no photograph, or the camera sees no lit proxy.
+    pub fn fitted_exposure_ev(&mut self) -> Option<f64> {
+        let core = &mut self.core;
+        let photo = core.scene.photo.as_ref()?;
+        let albedo = std::mem::take(&mut core.packed.photo_albedo);
+        let ev = photo_albedo::roughly_fit_exposure_ev(&mut core.packed, photo);
+        core.packed.photo_albedo = albedo;
+        ev
+    }
+
     /// Runs the pilot and begins the film that follows its plan.
     pub(super) fn look_ahead(&mut self, watcher: &Watcher<'_>) {
         let stopwatch = Stopwatch::start();

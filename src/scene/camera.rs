@@ -7,7 +7,7 @@ use super::error::Result;
 use super::pose::read_camera_pose;
 use super::projection::check_distortion;
 use super::reader::{Node, Table};
-use super::trajectory::{Intrinsics, half_view};
+use super::trajectory::{Intrinsics, PixelOrigin, half_view, read_camera};
 use super::{Aperture, Camera, Distortion, EXPECTED_FOCUS, Lens, Photo};
 use crate::distortion::LENS_FISHEYE;
 
@@ -26,6 +26,21 @@ const CAMERA_KEYS: &[&str] = &[
     "look_at",
     "up",
     "motion",
+    "file",
+    "pixel_origin",
+];
+
+/// What a `file` says in their place.
+const INTRINSICS_KEYS: &[&str] = &[
+    "width",
+    "height",
+    "fx",
+    "fy",
+    "vertical_fov_deg",
+    "cx",
+    "cy",
+    "distortion",
+    "lens_model",
 ];
 
 const LENS_KEYS: &[&str] = &[
@@ -38,10 +53,11 @@ const LENS_KEYS: &[&str] = &[
 ];
 
 /// `[camera]`, its intrinsics those `given` by the caller, if it brings any; then the table may be absent.
-pub(super) fn read_camera(
+pub(super) fn read_camera_table(
     root: &Table,
     photo: Option<&Photo>,
     given: Option<&Intrinsics>,
+    warnings: &mut Vec<String>,
 ) -> Result<Camera> {
     let table = root.table("camera", "[camera]", CAMERA_KEYS)?;
     if let Some(given) = given {
@@ -67,6 +83,15 @@ pub(super) fn read_camera(
             "add it",
         ));
     };
+    if table.get("file").is_some() {
+        return read_camera_file(&table, photo, warnings);
+    }
+    if let Some(error) = table.key_error(
+        "pixel_origin",
+        "`pixel_origin` without `file`; expected it beside a `file`, whose cx and cy it explains; remove it",
+    ) {
+        return Err(error);
+    }
     let width = read_side(&table, "width", photo.map(|photo| photo.width))?;
     let height = read_side(&table, "height", photo.map(|photo| photo.height))?;
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
@@ -102,6 +127,45 @@ pub(super) fn read_camera(
         }
     })?;
     Ok(camera)
+}
+
+/// `file`: a calibration with or without a pose, of another program.
+fn read_camera_file(
+    table: &Table,
+    photo: Option<&Photo>,
+    warnings: &mut Vec<String>,
+) -> Result<Camera> {
+    for key in INTRINSICS_KEYS {
+        table.refuse_both("file", key)?;
+    }
+    let origin = table.optional("pixel_origin", |node| node.choice::<PixelOrigin>())?;
+    let poses = ["world_from_camera", "position", "motion"];
+    let has_pose = poses.iter().any(|key| table.get(key).is_some());
+    let own_pose = read_camera_pose(table)?;
+    table.required("file", "file = \"camera.json\"", |node| {
+        let path = node.existing_file()?;
+        let file = read_camera(&path, origin).map_err(|problem| node.file_error(&path, problem))?;
+        warnings.extend(node.file_warnings(file.notes));
+        let size = photo.map(|photo| (photo.width, photo.height));
+        let size = size.or(file.intrinsics.size).ok_or_else(|| {
+            node.file_error(
+                &path,
+                "it tells no size; expected `width` and `height`; add them, or a photograph",
+            )
+        })?;
+        let pose = if has_pose {
+            own_pose
+        } else {
+            file.world_from_camera.unwrap_or(own_pose)
+        };
+        (file.intrinsics.camera(size, pose)).map_err(|problem| {
+            let expected = "intrinsics of the photograph's size";
+            node.file_error(
+                &path,
+                format!("{problem}; expected {expected}; scale them, or the photograph"),
+            )
+        })
+    })
 }
 
 /// `distortion` and `lens_model`; `None`: neither is there.
@@ -167,10 +231,11 @@ fn read_focal_lengths(table: &Table, height: f64, is_fisheye: bool) -> Result<(f
     }
 }
 
-pub(super) fn read_lens(root: &Table) -> Result<Lens> {
+/// The lens, and its focal length in millimetres where the file says it.
+pub(super) fn read_lens(root: &Table) -> Result<(Lens, Option<f64>)> {
     let pinhole = Lens::PINHOLE;
     let Some(table) = root.table("lens", "[lens]", LENS_KEYS)? else {
-        return Ok(pinhole);
+        return Ok((pinhole, None));
     };
     let aperture_radius_m = read_aperture_radius(&table)?;
     let focus = table.optional("focus_distance_m", Node::positive_or_infinite)?;
@@ -181,9 +246,8 @@ pub(super) fn read_lens(root: &Table) -> Result<Lens> {
             "add it",
         ));
     }
-    let focal_length_m = table
-        .optional("focal_length_mm", Node::positive)?
-        .map_or(0.0, |mm| mm / 1000.0);
+    let focal_length_mm = table.optional("focal_length_mm", Node::positive)?;
+    let focal_length_m = focal_length_mm.map_or(0.0, |mm| mm / 1000.0);
     let lens = Lens {
         aperture_radius_m,
         focus_distance_m: focus.unwrap_or(pinhole.focus_distance_m),
@@ -201,7 +265,7 @@ pub(super) fn read_lens(root: &Table) -> Result<Lens> {
             None => Ok(()),
         }
     })?;
-    Ok(lens)
+    Ok((lens, focal_length_mm))
 }
 
 fn read_aperture_radius(table: &Table) -> Result<f64> {

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-use super::camera::{read_camera, read_lens};
+use super::camera::{read_camera_table, read_lens};
+use super::check::read_allowed;
 use super::environment::read_environment;
 use super::error::{Result, SceneError, Source};
 use super::light::read_lights;
@@ -17,7 +18,7 @@ use super::settings::read_settings;
 use super::shutter::{read_camera_motion, read_shutter};
 use super::trajectory::Intrinsics;
 use super::{Photo, Scene, Stages};
-use crate::decode::{MAX_TEXT_BYTES, read_file};
+use crate::decode::{FileKind, MAX_TEXT_BYTES, kind_of, read_file};
 use crate::files;
 
 const TABLES: &[&str] = &[
@@ -30,6 +31,7 @@ const TABLES: &[&str] = &[
     "virtual",
     "render",
     "shutter",
+    "check",
 ];
 
 /// What a caller brings in place of the scene file's own.
@@ -60,6 +62,17 @@ pub fn load(path: &Path) -> std::result::Result<Scene, SceneError> {
 /// # Errors
 /// As [`load`]; or the intrinsics do not fit the photograph, or a file lies outside the sandbox.
 pub fn load_with(path: &Path, given: Given) -> std::result::Result<Scene, SceneError> {
+    if let Some(kind) = kind_of(path) {
+        let named = match kind {
+            FileKind::Picture(_) => "`image` in [photo]",
+            FileKind::Film(_) => "--frames of `mixray sequence`",
+            _ => "`mesh` in [[virtual]] or [[real]]",
+        };
+        return Err(SceneError::Unreadable {
+            path: path.to_path_buf(),
+            reason: format!("it is {}, which goes with a scene as {named}", kind.name()),
+        });
+    }
     let bytes = read_file(path, MAX_TEXT_BYTES).map_err(|reason| SceneError::Unreadable {
         path: path.to_path_buf(),
         reason,
@@ -93,10 +106,20 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
     let (photo, photo_settings) = read_photo(&root, given.photo, &mut warnings)?;
     let settings = read_settings(&root, photo_settings)?;
     let stages = Stages::read(&root)?;
-    let camera = read_camera(&root, photo.as_ref(), given.intrinsics.as_ref())?;
+    let allowed = read_allowed(&root)?;
+    let mut camera = read_camera_table(
+        &root,
+        photo.as_ref(),
+        given.intrinsics.as_ref(),
+        &mut warnings,
+    )?;
     let camera_path = read_camera_motion(&root)?;
     let shutter = read_shutter(&root)?;
-    let lens = read_lens(&root)?;
+    let time_secs = shutter.map_or(0.0, |shutter| shutter.time_secs);
+    if let Some(pose) = camera_path.pose(time_secs) {
+        camera.world_from_camera = pose;
+    }
+    let (lens, focal_length_mm) = read_lens(&root)?;
     check_reach(&camera, lens.aperture_radius_m).map_err(|problem| {
         root.error(
             problem,
@@ -106,7 +129,7 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
     })?;
     let environment = read_environment(&root, &mut warnings)?;
     let mut lights = read_lights(&root)?;
-    let reader = ObjectReader::new(photo.is_some(), &mut warnings);
+    let reader = ObjectReader::new(photo.is_some(), &camera, &mut warnings);
     let (objects, mesh_lights, mesh_files) = reader.read_all(&root)?;
     lights.extend(mesh_lights);
     let mut inputs = source.files.borrow().clone();
@@ -117,12 +140,13 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
             reason: error.to_string(),
         })?;
     }
-    Ok(Scene {
+    let mut scene = Scene {
         name: scene_name(&source.path),
         path: source.path.clone(),
         photo,
         camera,
         lens,
+        focal_length_mm,
         environment,
         lights,
         objects,
@@ -131,9 +155,11 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
         settings,
         inputs,
         stages,
+        allowed,
         warnings,
-    }
-    .at_its_time())
+    };
+    scene.set_time(time_secs);
+    Ok(scene)
 }
 
 /// The name of the folder that holds the file, or else of the file.

@@ -5,6 +5,7 @@
 
 pub mod animation;
 mod camera;
+pub mod check;
 pub mod deformation;
 mod environment;
 pub(crate) mod error;
@@ -15,11 +16,14 @@ mod light;
 mod material;
 mod object;
 mod photo;
+pub mod placing;
 mod pose;
 pub mod projection;
+pub mod ray;
 pub(crate) mod reader;
 pub(crate) mod sandbox;
 mod scan;
+pub(crate) mod scanned;
 mod settings;
 pub(crate) mod shape;
 mod shutter;
@@ -63,6 +67,8 @@ pub struct Scene {
     pub photo: Option<Photo>,
     pub camera: Camera,
     pub lens: Lens,
+    /// Of the lens, where the file says it.
+    pub focal_length_mm: Option<f64>,
     pub environment: Option<Environment>,
     pub lights: Vec<Light>,
     pub objects: Vec<Object>,
@@ -74,6 +80,8 @@ pub struct Scene {
     /// The files that the scene is made of, its own included.
     pub inputs: Vec<PathBuf>,
     pub stages: Stages,
+    /// Warnings that `[check] allow` silences.
+    pub allowed: Vec<check::Check>,
     /// Things worth telling the user that are not errors (dropped triangles, ignored gamma chunks).
     pub warnings: Vec<String>,
 }

@@ -11,12 +11,14 @@ use super::deformation::Deformation;
 use super::error::{Result, SceneError};
 use super::gltf::{GltfScene, PlacedLight, Problem, PunctualLight, load_within};
 use super::material::{lambertian, read_material};
-use super::pose::read_transform;
+use super::placing::{self, Surroundings, bounds, read_placed};
 use super::reader::{Choice, Node, Table};
 use super::scan::settle_scan;
+use super::scanned;
 use super::shape::Shape;
 use super::shutter::read_object_motion;
-use super::{AlphaMode, Instance, Light, LightKind, Material, Object, Side};
+use super::{AlphaMode, Camera, Instance, Light, LightKind, Material, Object, Side};
+use crate::decode::{FileKind, kind_of};
 
 const KEYS: &[&str] = &[
     "mesh",
@@ -42,6 +44,8 @@ const MAX_DISTANCE_M: f64 = 1e12;
 /// Reads the objects of one scene file.
 pub(super) struct ObjectReader<'w> {
     has_photo: bool,
+    /// At the picture's time.
+    camera: &'w Camera,
     warnings: &'w mut Vec<String>,
     /// Lights that meshes brought.
     lights: Vec<Light>,
@@ -58,9 +62,10 @@ struct Parts {
 }
 
 impl<'w> ObjectReader<'w> {
-    pub fn new(has_photo: bool, warnings: &'w mut Vec<String>) -> Self {
+    pub fn new(has_photo: bool, camera: &'w Camera, warnings: &'w mut Vec<String>) -> Self {
         Self {
             has_photo,
+            camera,
             warnings,
             lights: Vec::new(),
             meshes: HashMap::new(),
@@ -72,14 +77,16 @@ impl<'w> ObjectReader<'w> {
         let mut objects = Vec::new();
         for (key, side) in [("real", Side::Real), ("virtual", Side::Virtual)] {
             for node in root.list(key)? {
-                objects.push(self.read(&node, side)?);
+                let object = self.read(&node, side, &objects)?;
+                objects.push(object);
             }
         }
         let files = self.meshes.values().flat_map(|mesh| mesh.files.clone());
         Ok((objects, self.lights, files.collect()))
     }
 
-    fn read(&mut self, node: &Node, side: Side) -> Result<Object> {
+    /// `before`: the objects that were read before this one, all real ones among them where it is virtual.
+    fn read(&mut self, node: &Node, side: Side, before: &[Object]) -> Result<Object> {
         let table = node.any_table(match side {
             Side::Real => "[[real]]",
             Side::Virtual => "[[virtual]]",
@@ -91,11 +98,16 @@ impl<'w> ObjectReader<'w> {
                 let animation =
                     table.optional("animation", |node| Ok(node.string()?.to_owned()))?;
                 table.required("mesh", "mesh = \"file.glb\"", |node| {
-                    self.read_mesh(node, animation)
+                    self.read_mesh(node, side, animation)
                 })?
             }
         };
-        let world_from_object = read_transform(&table)?;
+        let reals = before.partition_point(|object| object.side == Side::Real);
+        let around = Surroundings {
+            camera: self.camera,
+            real: &before[..reals],
+        };
+        let world_from_object = read_placed(&table, &parts.instances, around)?;
         let name = table.optional("name", |node| Ok(node.string()?.to_owned()))?;
         let mut object = Object {
             name: name.unwrap_or(parts.name),
@@ -122,14 +134,22 @@ impl<'w> ObjectReader<'w> {
         Ok(object)
     }
 
-    fn read_mesh(&mut self, node: &Node, animation: Option<String>) -> Result<Parts> {
+    fn read_mesh(&mut self, node: &Node, side: Side, animation: Option<String>) -> Result<Parts> {
         let path = node.existing_file()?;
+        let kind = kind_of(&path).filter(|kind| *kind != FileKind::Gltf);
+        if let Some(refusal) = kind.and_then(|kind| refuse_kind(kind, side)) {
+            return Err(node.file_error(&path, refusal));
+        }
         let key = (path.clone(), animation);
         let mesh = match self.meshes.get(&key) {
             Some(mesh) => Rc::clone(mesh),
             None => {
-                let mesh = load_within(&path, key.1.as_deref(), node.sandbox())
-                    .map_err(|error| node.file_error(&path, advise(&error.problem)))?;
+                let mesh = match kind {
+                    Some(kind) => scanned::read(&path, kind),
+                    None => load_within(&path, key.1.as_deref(), node.sandbox())
+                        .map_err(|error| advise(&error.problem)),
+                }
+                .map_err(|problem| node.file_error(&path, problem))?;
                 self.warnings
                     .extend(node.file_warnings(mesh.warnings.clone()));
                 let mesh = Rc::new(mesh);
@@ -265,14 +285,6 @@ impl Instance {
     }
 }
 
-/// Least and greatest corner.
-fn bounds(points: impl Iterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
-    points.fold(None, |bounds, p| {
-        let (lo, hi) = bounds.unwrap_or((p, p));
-        Some((lo.min(p), hi.max(p)))
-    })
-}
-
 /// Refuses keys that do not go with this side and shape; returns the shape.
 fn check_keys(table: &Table, side: Side) -> Result<Option<Shape>> {
     table.refuse_both("mesh", "shape")?;
@@ -288,7 +300,7 @@ fn check_keys(table: &Table, side: Side) -> Result<Option<Shape>> {
         }
     }
     if side == Side::Real {
-        for key in ["motion", "animation"] {
+        for key in ["motion", "animation"].iter().chain(placing::VIRTUAL_KEYS) {
             let message = format!(
                 "`{key}` in [[real]]; expected it in [[virtual]] only: the photograph shows real things where they are; remove it"
             );
@@ -298,10 +310,12 @@ fn check_keys(table: &Table, side: Side) -> Result<Option<Shape>> {
         }
     }
     let mut known = KEYS.to_vec();
+    known.extend(placing::KEYS);
     known.extend(shape.map_or(&[][..], Shape::keys));
-    if side == Side::Real {
-        known.extend(REAL_KEYS);
-    }
+    known.extend(match side {
+        Side::Real => REAL_KEYS,
+        Side::Virtual => placing::VIRTUAL_KEYS,
+    });
     table.refuse_unknown(&known)?;
     Ok(shape)
 }
@@ -420,6 +434,24 @@ fn place_light(world_from_object: DMat4, light: &PlacedLight) -> Option<LightKin
             irradiance,
         },
     })
+}
+
+/// Why a file of that kind, which is not glTF, is no mesh of that side.
+fn refuse_kind(kind: FileKind, side: Side) -> Option<String> {
+    let name = kind.name();
+    let convert = "import it in Blender and export it as glTF 2.0 (.glb)";
+    match (kind, side) {
+        (FileKind::Ply | FileKind::Obj, Side::Real) => None,
+        (FileKind::Ply | FileKind::Obj, Side::Virtual) => Some(format!(
+            "it is {name}, which is read in [[real]] alone; expected glTF, with its materials; {convert}"
+        )),
+        (FileKind::Picture(_) | FileKind::Film(_), _) => Some(format!(
+            "it is {name}; expected a glTF model; name another file"
+        )),
+        _ => Some(format!(
+            "it is {name}; expected glTF 2.0, or in [[real]] PLY or OBJ; {convert}"
+        )),
+    }
 }
 
 /// "problem; expected ...; how to mend" of a mesh file.

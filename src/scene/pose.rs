@@ -108,17 +108,7 @@ fn nearest_rotation(mut rotation: DMat3) -> DMat3 {
     rotation
 }
 
-/// `translation`, `rotation_deg` or `rotation`, and `scale` as T * R * S.
-pub(super) fn read_transform(table: &Table) -> Result<DMat4> {
-    let (scale, rotation, translation) = read_placement(table)?;
-    Ok(DMat4::from_scale_rotation_translation(
-        scale,
-        rotation,
-        translation,
-    ))
-}
-
-/// Scale, rotation and translation.
+/// Scale, rotation and translation, which make T * R * S: `translation`, `rotation_deg` or `rotation`, and `scale`.
 pub(super) fn read_placement(table: &Table) -> Result<(DVec3, DQuat, DVec3)> {
     table.refuse_both("rotation_deg", "rotation")?;
     let translation = table.optional("translation", |node| node.vector::<3>())?;

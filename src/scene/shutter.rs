@@ -116,16 +116,6 @@ impl Scene {
             }
         }
     }
-
-    /// The scene with its objects at the picture's time, and where the camera has keys, the camera too.
-    pub(super) fn at_its_time(mut self) -> Self {
-        let time_secs = self.shutter.map_or(0.0, |shutter| shutter.time_secs);
-        self.set_time(time_secs);
-        if let Some(pose) = self.camera_path.pose(time_secs) {
-            self.camera.world_from_camera = pose;
-        }
-        self
-    }
 }
 
 const SHUTTER_KEYS: &[&str] = &["exposure_secs", "readout_secs", "samples", "time_secs"];

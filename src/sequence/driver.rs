@@ -6,20 +6,18 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::plan::{Files, check_focus, check_frames, check_rate, in_range, known_rate, views};
+use super::plan::{Files, in_part, in_range};
 use super::report::{FrameCounts, SequenceSeconds, SequenceStats};
+use super::whole::{Whole, open_source};
 use super::{Event, SequenceError, SequenceOptions};
-use crate::output::PngBits;
 use crate::pack::next_anchor;
 use crate::renderer::{
     Budget, ErrorGoal, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions, Watcher,
 };
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
-use crate::scene::{
-    BackendChoice, Camera, Content, ContentHash, Exposure, Lens, MotionBlurMethod, Scene,
-};
+use crate::scene::{Camera, Lens, MotionBlurMethod, Scene};
 use crate::stages::{Finished, GpuStages, finish};
-use crate::video::{FrameSink, FrameSource, Header, Matrix, Pixels, SinkPlan, Taken, VideoFrame};
+use crate::video::{FrameSink, Header, Pixels, SinkPlan, Taken, VideoFrame};
 
 /// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
 const REACH_FRAMES: f64 = 1.5;
@@ -43,46 +41,18 @@ pub fn render_sequence(
     hear: &dyn Fn(&Event<'_>),
 ) -> Result<RenderedSequence, SequenceError> {
     let files = Files::read(options)?;
-    let frames = options.frames.as_deref().ok_or_else(|| {
-        SequenceError::Unfit(
-            "--frames is absent; expected a folder of pictures, a .y4m file, or -; add it"
-                .to_owned(),
-        )
-    })?;
-    let mut source = FrameSource::open(frames)?;
-    if let Some(matrix) = options.matrix {
-        source.set_matrix(matrix);
-    }
-    let rate = known_rate(options, &files.trajectory, Some(&source));
-    let views = views(&files.trajectory, rate, source.is_stream())?;
-    check_frames(options, &source, &views, hear)?;
-    let names: Option<Vec<FrameName>> = source.names().map(|names| {
-        names
-            .into_iter()
-            .filter(|name| in_range(options, name))
-            .collect()
-    });
-    if let (Some((from, to)), None) = (options.focus_pull_m, &names)
-        && options.range.is_none()
-    {
-        return Err(SequenceError::Unfit(format!(
-            "--focus-pull {from}..{to} of a stream whose length is not known; expected a range; give --range"
-        )));
-    }
+    let mut source = open_source(options)?;
+    let whole = Whole::new(options, &files, &source, hear)?;
     hear(&Event::Plan {
-        frames: names.as_ref().map(Vec::len),
+        frames: whole.names_of_part().map(|names| names.len()),
     });
     let mut sequence = Sequence {
-        options,
-        files: &files,
-        views: &views,
-        rate,
-        span: span(options, &source),
-        names: names.unwrap_or_default(),
+        whole,
         hear,
         told: HashSet::new(),
         lost: Vec::new(),
         started: None,
+        anchor: None,
         frames: FrameCounts::default(),
         seconds: SequenceSeconds::default(),
         rays: RayCounts::default(),
@@ -93,18 +63,26 @@ pub fn render_sequence(
             break false;
         }
         let begin = Instant::now();
-        let wanted = |name: &FrameName| in_range(options, name);
+        let wanted = |name: &FrameName| sequence.wants(name);
         let Some((name, taken)) = source.next(&wanted)? else {
             break true;
         };
         sequence.seconds.load += begin.elapsed().as_secs_f64();
-        if options.range.is_some_and(|(_, to)| name.number >= to) {
+        let is_past = |range: Option<(u32, u32)>| range.is_some_and(|(_, to)| name.number >= to);
+        if is_past(options.range) || is_past(options.part) {
             break true;
+        }
+        if in_range(options, &name) {
+            sequence.follow(&name)?;
         }
         let (label, number) = (name.label.as_str(), name.number);
         let header = source.header().cloned();
         match taken {
             Taken::Skipped => continue,
+            Taken::Whole(frame) if !in_part(options, &name) => {
+                sequence.take(&name, frame, header, watcher)?;
+                continue;
+            }
             Taken::Whole(frame) => {
                 hear(&Event::Begins { label, number });
                 if !sequence.take(&name, frame, header, watcher)? {
@@ -124,30 +102,16 @@ pub fn render_sequence(
     sequence.end(complete)
 }
 
-/// The first and the last frame's number, where they are known: the focus is pulled between them.
-fn span(options: &SequenceOptions, source: &FrameSource) -> Option<(u32, u32)> {
-    if let Some((from, to)) = options.range {
-        return Some((from, to - 1));
-    }
-    let names = source.names()?;
-    Some((names.first()?.number, names.last()?.number))
-}
-
 struct Sequence<'a> {
-    options: &'a SequenceOptions,
-    files: &'a Files,
-    views: &'a Views<'a>,
-    /// Frames a second, where known.
-    rate: Option<f64>,
-    span: Option<(u32, u32)>,
-    /// The frames to come, where they are known.
-    names: Vec<FrameName>,
+    whole: Whole<'a>,
     hear: &'a dyn Fn(&Event<'_>),
     /// Warnings of frames.
     told: HashSet<String>,
     /// Frames before the first of which anything is there.
     lost: Vec<FrameName>,
     started: Option<Started>,
+    /// The coordinates' origin: the same for every frame whichever run renders it.
+    anchor: Option<DVec3>,
     frames: FrameCounts,
     seconds: SequenceSeconds,
     rays: RayCounts,
@@ -168,13 +132,32 @@ struct Started {
     goal: Option<ErrorGoal>,
     scene: Option<Scene>,
     gpu: Option<GpuStages>,
-    anchor: Option<DVec3>,
     seed: u32,
     notes: usize,
 }
 
 impl Sequence<'_> {
-    /// Renders, keeps or passes a frame on; false if it was interrupted.
+    /// The frame has to be decoded: it is of the part, or of those before it that all frames depend on, the first and the first posed.
+    fn wants(&self, name: &FrameName) -> bool {
+        let view = || self.whole.views.of(name);
+        let is_posed = || view().is_ok_and(|view| view.world_from_camera.is_some());
+        let all_depend = || match &self.started {
+            None => true,
+            Some(started) => started.renderer.is_none() && is_posed(),
+        };
+        let options = self.whole.options;
+        in_range(options, name) && (in_part(options, name) || all_depend())
+    }
+
+    /// The origin goes with the camera, whether or not the frame is rendered.
+    fn follow(&mut self, name: &FrameName) -> Result<(), SequenceError> {
+        if let Some(pose) = self.whole.views.of(name)?.world_from_camera {
+            self.anchor = Some(next_anchor(self.anchor, pose.w_axis.truncate()));
+        }
+        Ok(())
+    }
+
+    /// Renders, keeps or passes a frame on; false if it was interrupted. What is not of the part is not touched.
     fn take(
         &mut self,
         name: &FrameName,
@@ -182,7 +165,7 @@ impl Sequence<'_> {
         header: Option<Header>,
         watcher: &Watcher<'_>,
     ) -> Result<bool, SequenceError> {
-        let view = self.views.of(name)?;
+        let view = self.whole.views.of(name)?;
         // What all frames have alike is told once.
         for warning in &frame.warnings {
             if self.told.insert(warning.clone()) {
@@ -205,15 +188,11 @@ impl Sequence<'_> {
                 name.label, size.0, size.1, started.size.0, started.size.1
             )));
         }
-        let position = view.world_from_camera.map(|pose| pose.w_axis.truncate());
-        if let Some(position) = position {
-            // The same for every frame whichever run renders it.
-            started.anchor = Some(next_anchor(started.anchor, position));
-        }
-        let there = started.sink.has(name, &frame)?;
+        let is_ours = in_part(self.whole.options, name);
+        let there = !is_ours || started.sink.has(name, &frame)?;
         let Some(world_from_camera) = view.world_from_camera else {
             if there {
-                self.frames.kept += 1;
+                self.frames.kept += u32::from(is_ours);
                 return Ok(true);
             }
             let begin = Instant::now();
@@ -222,7 +201,7 @@ impl Sequence<'_> {
             self.frames.passed_through += 1;
             return Ok(true);
         };
-        let camera = match self.files.intrinsics_of(&view) {
+        let camera = match self.whole.files.intrinsics_of(&view) {
             Some(intrinsics) => (intrinsics.camera(size, world_from_camera)).map_err(|problem| {
                 SequenceError::Unfit(format!("{}: {problem}; expected intrinsics of the frames' size; calibrate at that size, or scale the frames", name.label))
             })?,
@@ -232,7 +211,7 @@ impl Sequence<'_> {
             },
         };
         let time_secs = view.time_secs.unwrap_or(0.0);
-        let near = near(self.views, time_secs);
+        let near = near(&self.whole.views, time_secs);
         let previous = near
             .key_before(time_secs)
             .map(|(time_secs, pose)| PreviousView {
@@ -240,9 +219,13 @@ impl Sequence<'_> {
                 time_secs,
             });
         let lens = Lens {
-            focus_distance_m: pulled_focus(self.options.focus_pull_m, self.span, name.number)
-                .or(view.focus_distance_m)
-                .unwrap_or(started.lens.focus_distance_m),
+            focus_distance_m: pulled_focus(
+                self.whole.options.focus_pull_m,
+                self.whole.span,
+                name.number,
+            )
+            .or(view.focus_distance_m)
+            .unwrap_or(started.lens.focus_distance_m),
             ..started.lens
         };
         if let Some(mut scene) = started.scene.take() {
@@ -251,11 +234,16 @@ impl Sequence<'_> {
             scene.photo = Some(frame.photo.clone());
             scene.camera = camera.clone();
             let with = RendererOptions {
-                without: self.options.without,
-                filter: self.options.filter,
+                without: self.whole.options.without,
+                filter: self.whole.options.filter,
                 ..RendererOptions::default()
             };
-            let goal = self.options.goal.map(|goal| goal.of(&scene)).transpose()?;
+            let goal = self
+                .whole
+                .options
+                .goal
+                .map(|goal| goal.of(&scene))
+                .transpose()?;
             let renderer = Renderer::new(scene, with, &watcher.to_the_end())?;
             let estimator = renderer.scene().settings.estimator;
             let on_gpu = renderer.gpu_device().is_some();
@@ -270,7 +258,7 @@ impl Sequence<'_> {
             started.renderer = Some(renderer);
         }
         if there {
-            self.frames.kept += 1;
+            self.frames.kept += u32::from(is_ours);
             return Ok(true);
         }
         let Some(renderer) = &mut started.renderer else {
@@ -285,7 +273,7 @@ impl Sequence<'_> {
                 camera_path: near,
                 time_secs,
                 seed: started.seed.wrapping_add(name.number),
-                anchor: started.anchor,
+                anchor: self.anchor,
             },
             &Watcher::none(),
         )?;
@@ -347,6 +335,9 @@ impl Sequence<'_> {
         rest: Option<VideoFrame>,
         header: Option<Header>,
     ) -> Result<(), SequenceError> {
+        if !in_part(self.whole.options, name) {
+            return Ok(());
+        }
         let reason = problem.split("; ").next().unwrap_or(problem);
         let tell = |what: &str| (self.hear)(&Event::Warning(format!("{reason}; {what}")));
         let Some(frame) = rest else {
@@ -364,15 +355,12 @@ impl Sequence<'_> {
             return Ok(());
         };
         tell("the frame passes through");
-        let view = self.views.of(name)?;
+        let view = self.whole.views.of(name)?;
         let started = match self.started.take() {
             Some(started) => started,
             None => self.start(&view, &frame, header)?,
         };
         let started = self.started.insert(started);
-        if let Some(position) = view.world_from_camera.map(|pose| pose.w_axis.truncate()) {
-            started.anchor = Some(next_anchor(started.anchor, position));
-        }
         if started.sink.has(name, &frame)? {
             self.frames.kept += 1;
             return Ok(());
@@ -388,27 +376,17 @@ impl Sequence<'_> {
         frame: &VideoFrame,
         header: Option<Header>,
     ) -> Result<Started, SequenceError> {
-        let mut scene =
-            self.files
-                .scene(self.options, view, Some(frame.photo.clone()), self.hear)?;
-        check_rate(&scene, self.rate, self.views.have_own_times())?;
-        check_focus(self.options, &self.files.trajectory, &scene.lens)?;
-        let size = (frame.photo.width, frame.photo.height);
-        // The photograph of the moment is no part of what the frames are made with.
-        let size = scene
-            .photo
-            .take()
-            .map_or(size, |photo| (photo.width, photo.height));
-        let options = self.options;
-        let mut header = header.unwrap_or_else(|| Header::new(size.0, size.1, self.rate));
+        let (scene, size) = self.whole.scene(view, &frame.photo, self.hear)?;
+        let options = self.whole.options;
+        let mut header = header.unwrap_or_else(|| Header::new(size.0, size.1, self.whole.rate));
         header.matrix = options.matrix.unwrap_or(header.matrix);
         let mut sink = FrameSink::open(SinkPlan {
             path: &options.output,
-            fingerprint: self.fingerprint(&scene),
+            fingerprint: self.whole.fingerprint(&scene),
             header,
             png_bits: options.png_bits,
             overwrite: options.overwrite,
-            names: self.names.clone(),
+            names: self.whole.names_of_part().unwrap_or_default(),
         })?;
         for name in &self.lost {
             sink.stand_in(name)?;
@@ -424,39 +402,18 @@ impl Sequence<'_> {
             goal: None,
             scene: Some(scene),
             gpu: None,
-            anchor: None,
             notes: 0,
         })
     }
 
-    /// Of all that the frames are made with but the photographs.
-    fn fingerprint(&self, scene: &Scene) -> String {
-        let options = self.options;
-        let poses = &self.files.trajectory;
-        let settings = &scene.settings;
-        let may_be_gpu = settings.backend != BackendChoice::Cpu;
-        let without = options.without.of_pictures(may_be_gpu);
-        let png_bits = (options.png_bits).map(|bits| bits == PngBits::Sixteen);
-        // What is fitted or pulled over the frames depends on which there are; a file tells by their order which it holds.
-        let fits = settings.exposure == Exposure::Auto;
-        let is_file = options.output.extension().is_some_and(|e| e == "y4m");
-        let scope = (fits || options.focus_pull_m.is_some() || is_file)
-            .then_some((options.range, self.span));
-        let mut hash = ContentHash::default();
-        (env!("CARGO_PKG_VERSION"), scene.fingerprint()).add_to(&mut hash);
-        (settings, &scene.stages).add_to(&mut hash);
-        (without.names(), png_bits).add_to(&mut hash);
-        format!("{:?} {:?}", options.filter, options.goal).add_to(&mut hash);
-        (&poses.entries, (poses.intrinsics, self.files.intrinsics)).add_to(&mut hash);
-        (self.rate, (options.focus_pull_m, scope)).add_to(&mut hash);
-        options.matrix.map(Matrix::name).add_to(&mut hash);
-        self.views.folder_of(&self.names).add_to(&mut hash);
-        hash.finish()
-    }
-
     fn end(self, complete: bool) -> Result<RenderedSequence, SequenceError> {
         let Some(started) = self.started else {
-            let frames = self.options.frames.as_deref().unwrap_or(Path::new("-"));
+            let frames = self
+                .whole
+                .options
+                .frames
+                .as_deref()
+                .unwrap_or(Path::new("-"));
             return Err(SequenceError::Unfit(format!(
                 "{}: no frame of the range was found; expected at least one; correct --range",
                 frames.display()

@@ -20,12 +20,15 @@ mod check;
 mod driver;
 mod plan;
 mod report;
+mod survey;
+mod whole;
 
 use std::path::PathBuf;
 
 pub use check::{Reprojection, check_poses};
 pub use driver::{RenderedSequence, render_sequence};
 pub use report::{FrameCounts, SequenceSeconds, SequenceStats};
+pub use survey::{Survey, survey};
 
 use crate::output::{OutputError, PngBits};
 use crate::renderer::{Filter, Goal, RenderError, Without};
@@ -56,6 +59,8 @@ pub struct SequenceOptions {
     pub output: PathBuf,
     /// Numbers of the frames to render, the end not included.
     pub range: Option<(u32, u32)>,
+    /// Of the range only these are rendered and written, the end not included, each equal to the same frame of the whole range.
+    pub part: Option<(u32, u32)>,
     /// Numbers may be missing among the frames of a folder.
     pub allow_gaps: bool,
     /// Frames of which a part is lost are named and go on as they are; else they are errors.
@@ -93,6 +98,7 @@ impl SequenceOptions {
             intrinsics: None,
             output: output.into(),
             range: None,
+            part: None,
             allow_gaps: false,
             pass_damaged_frames: false,
             matrix: None,

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{Event, SequenceError, SequenceOptions};
+use crate::check::{self, Extent};
 use crate::scene::trajectory::{
     FrameName, FrameView, Intrinsics, Trajectory, Views, read_intrinsics,
 };
@@ -48,6 +49,9 @@ impl Files {
         scene.settings.apply(&options.overrides);
         for warning in &scene.warnings {
             hear(&Event::Warning(warning.clone()));
+        }
+        for finding in check::scene(&scene, Extent::WithoutCamera) {
+            hear(&Event::Warning(finding.to_string()));
         }
         Ok(scene)
     }
@@ -119,6 +123,16 @@ pub(super) fn check_frames(
     check_gaps(options, frames, &wanted)?;
     if let Some(gaps) = gaps_in_time(&wanted).filter(|_| !options.allow_gaps) {
         hear(&Event::Warning(format!("{}: {gaps}", frames.display())));
+    }
+    if let Some((from, to)) = options.part
+        && !wanted.iter().any(|name| in_part(options, name))
+    {
+        return Err(SequenceError::Unfit(format!(
+            "{}: no frame of the range is in the part {from}..{to}; expected numbers from {} to {}; correct --part",
+            frames.display(),
+            wanted.first().map_or(0, |name| name.number),
+            wanted.last().map_or(0, |name| name.number)
+        )));
     }
     if views.pairs_in_order(&names) && views.len() > names.len() {
         hear(&Event::Warning(format!(
@@ -239,4 +253,10 @@ pub(super) fn in_range(options: &SequenceOptions, name: &FrameName) -> bool {
         Some((from, to)) => (from..to).contains(&name.number),
         None => true,
     }
+}
+
+/// The frame is one that this run renders and writes.
+pub(super) fn in_part(options: &SequenceOptions, name: &FrameName) -> bool {
+    let (from, to) = options.part.unwrap_or((0, u32::MAX));
+    in_range(options, name) && (from..to).contains(&name.number)
 }

@@ -9,7 +9,7 @@ use super::motion_blur::PictureMotion;
 use super::{GpuStages, STAGES};
 use crate::film::{Film, Means, Picture};
 use crate::gpu::GpuError;
-use crate::scene::Scene;
+use crate::scene::{Composite, Scene};
 use crate::shared::Module;
 
 /// A stage as it is applied to a shot.
@@ -34,7 +34,9 @@ pub(super) struct Shot<'a> {
     /// What the copies of motion blur go along.
     pub motion: Option<&'a PictureMotion>,
     /// How much of each pixel is virtual since a stage has changed that.
-    pub blurred_mask: Option<Vec<f32>>,
+    pub changed_mask: Option<Vec<f32>>,
+    /// What the stages have multiplied the variance with that the estimate brought in.
+    pub estimate_gain: f32,
     /// What the user should hear.
     pub notes: Vec<String>,
 }
@@ -42,13 +44,29 @@ pub(super) struct Shot<'a> {
 impl Shot<'_> {
     /// How much of each pixel is virtual, 0 to 1.
     pub fn mask(&self) -> Cow<'_, [f32]> {
-        match &self.blurred_mask {
+        match &self.changed_mask {
             Some(mask) => Cow::Borrowed(mask),
             None => {
                 let pixels = self.film.pixels.iter();
                 pixels.map(|sums| Means::of(sums).mask as f32).collect()
             }
         }
+    }
+
+    /// What the quotient composite multiplied the photograph with; None for the additive one, which leaves it as it is.
+    pub fn ratio(&self) -> Option<Vec<[f32; 3]>> {
+        if self.scene.settings.composite == Composite::Additive {
+            return None;
+        }
+        let ratios = (0..self.film.pixels.len()).map(|pixel| {
+            let sums = self.film.sums(pixel);
+            if sums.n == 0 || sums.n_real == 0 {
+                return [1.0; 3];
+            }
+            let ratio = Means::of(&sums).quotient().max(glam::DVec3::ZERO);
+            ratio.as_vec3().to_array()
+        });
+        Some(ratios.collect())
     }
 }
 
@@ -112,7 +130,8 @@ pub fn finish(
         scene,
         frame,
         motion,
-        blurred_mask: None,
+        changed_mask: None,
+        estimate_gain: 1.0,
         notes: Vec::new(),
     };
     let mut seconds = StageSeconds::default();

@@ -1,6 +1,6 @@
 //! Camera stages: what a camera does to a picture after the composite, or what replaces it.
 //!
-//! Order: composite, boundary antialiasing, motion blur by copies, noise, response and quantisation; or composite, cartoon. A stage knows no ray: it
+//! Order: composite, boundary antialiasing, motion blur by copies, sharpness, noise, response and quantisation; or composite, cartoon. A stage knows no ray: it
 //! works on the film of a render and on images of other programs alike.
 //!
 //! A stage is one folder: `settings.rs` (its table in a scene file, and what stands in it), the CPU's side, `gpu.rs` (the host's side of the twin
@@ -17,6 +17,7 @@ mod finish;
 pub mod motion_blur;
 pub mod noise;
 pub(crate) mod settings;
+pub mod sharpness;
 mod table;
 #[cfg(test)]
 mod test_support;
@@ -32,6 +33,7 @@ pub use motion_blur::{ObjectBlur, PictureMotion};
 const STAGES: &[finish::Stage] = &[
     antialias::STAGE,
     motion_blur::STAGE,
+    sharpness::STAGE,
     noise::STAGE,
     cartoon::STAGE,
 ];

@@ -9,6 +9,7 @@ pub use super::noise::settings::{
     Autocorrelation, LAGS, MAX_BINS, NOISE_PROFILE_VERSION, NoiseBin, NoiseFit, NoiseMethod,
     NoiseProfile, NoiseSettings, WHITE, bin_index,
 };
+pub use super::sharpness::settings::{PointSpread, SharpnessSettings};
 
 use crate::scene::error::Result;
 use crate::scene::fingerprint::content;
@@ -53,6 +54,7 @@ macro_rules! stages {
 stages! {
     antialias: AntialiasSettings,
     motion_blur: MotionBlurSettings,
+    sharpness: SharpnessSettings,
     noise: NoiseSettings,
     /// Never beside the others: it replaces what makes a picture look photographed.
     cartoon: CartoonSettings,

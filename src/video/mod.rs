@@ -8,7 +8,7 @@ mod y4m_file;
 mod yuv;
 
 pub use matrix::Matrix;
-pub use sink::{FrameSink, SinkPlan};
+pub use sink::{FrameSink, SinkPlan, sequence_note};
 pub use source::{FrameRange, FrameSource, Pixels, Taken, VideoFrame};
 pub use y4m::{Chroma, Header, Y4mReader};
 pub use yuv::{decode_yuv, encode_yuv};

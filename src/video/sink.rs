@@ -25,6 +25,12 @@ use crate::scene::{EncodedPhoto, Photo};
 /// The note in a folder of frames.
 const NOTE: &str = "mixray-sequence.json";
 
+/// The note of a render in its folder: its name, and what it says.
+pub fn sequence_note(fingerprint: &str) -> (&'static str, String) {
+    let text = format!("{{\n  \"fingerprint\": \"{fingerprint}\"\n}}\n");
+    (NOTE, text)
+}
+
 /// What a sink has to know before the first frame.
 pub struct SinkPlan<'a> {
     /// A folder, a file that ends in .y4m, or `-`.
@@ -267,7 +273,7 @@ fn open_folder(plan: &SinkPlan<'_>) -> Result<PathBuf, VideoError> {
         true => is_numbered(output),
         false => own.contains(output),
     });
-    let note = format!("{{\n  \"fingerprint\": \"{}\"\n}}\n", plan.fingerprint);
+    let (_, note) = sequence_note(&plan.fingerprint);
     let found = std::fs::read_to_string(&note_path).unwrap_or_default();
     if found == note {
         return Ok(folder);
@@ -277,8 +283,15 @@ fn open_folder(plan: &SinkPlan<'_>) -> Result<PathBuf, VideoError> {
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|path| path.extension().is_some_and(|e| e == "png"))
         .collect();
-    if !others.is_empty() && !plan.overwrite {
-        return Err(foreign(plan.path, &found));
+    if !others.is_empty() {
+        // Another run of the same render may have begun since: its note is there before its first frame.
+        let found = std::fs::read_to_string(&note_path).unwrap_or_default();
+        if found == note {
+            return Ok(folder);
+        }
+        if !plan.overwrite {
+            return Err(foreign(plan.path, &found));
+        }
     }
     for path in &others {
         files::before_write(path).map_err(OutputError::from)?;

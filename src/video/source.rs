@@ -109,6 +109,14 @@ impl FrameSource {
         }
     }
 
+    /// The pictures of a folder in the frames' order; empty for streams.
+    pub fn pictures(&self) -> Vec<(FrameName, PathBuf)> {
+        match &self.kind {
+            Kind::Folder(files) => files.clone(),
+            _ => Vec::new(),
+        }
+    }
+
     /// All frames, where they are known before they are read.
     pub fn names(&self) -> Option<Vec<FrameName>> {
         match &self.kind {

@@ -6,7 +6,7 @@ use std::io::Read;
 
 use super::matrix::Matrix;
 use super::{Place, VideoError};
-use crate::decode::{check_size, ensure_memory};
+use crate::decode::{check_size, ensure_memory, film_kind};
 use crate::refusal::Refusal;
 
 /// How many pixels share a colour sample.
@@ -200,7 +200,7 @@ impl<R: Read> Y4mReader<R> {
                     "it cannot be read ({error}); expected a Y4M stream; check where it comes from"
                 ))
             })?;
-        if let Some(kind) = kind_of_film(&begin) {
+        if let Some(kind) = film_kind(&begin) {
             return Err(place.error(format!(
                 "it is {kind}, no Y4M stream; expected frames without compression; convert it with `ffmpeg -i VIDEO -pix_fmt yuv420p -f yuv4mpegpipe -`"
             )));
@@ -311,22 +311,6 @@ impl<R: Read> Y4mReader<R> {
 
 /// How many bytes tell the kinds of films apart.
 const LONGEST_SIGN: u64 = 12;
-
-/// Of files of other programs that hold films.
-fn kind_of_film(begin: &[u8]) -> Option<&'static str> {
-    match begin {
-        [_, _, _, _, b'f', b't', b'y', b'p', ..] | [_, _, _, _, b'm', b'o', b'o', b'v', ..] => {
-            Some("an MP4 or QuickTime film")
-        }
-        [0x1a, 0x45, 0xdf, 0xa3, ..] => Some("a Matroska or WebM film"),
-        [b'R', b'I', b'F', b'F', _, _, _, _, b'A', b'V', b'I', ..] => Some("an AVI film"),
-        [b'O', b'g', b'g', b'S', ..] => Some("an Ogg film"),
-        [b'F', b'L', b'V', ..] => Some("a Flash film"),
-        [b'G', b'I', b'F', b'8', ..] => Some("a GIF"),
-        [0x00, 0x00, 0x00, 0x01, ..] | [0x00, 0x00, 0x01, ..] => Some("an MPEG or H.264 stream"),
-        _ => None,
-    }
-}
 
 /// A line without its end; `None` at the end of the input.
 fn read_line(input: &mut impl Read, place: &Place) -> Result<Option<String>, VideoError> {

@@ -8,4 +8,4 @@ mod flicker;
 mod frames;
 mod ranges;
 mod resume;
-mod support;
+pub mod support;

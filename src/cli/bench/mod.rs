@@ -4,6 +4,7 @@ mod conclusions;
 mod docs;
 mod files;
 mod flags;
+mod gpu_code;
 mod gpu_time;
 mod growth;
 mod paper;
@@ -38,6 +39,7 @@ enum Measurement {
     PaperTable(paper::Arguments),
     Stress(stress::Arguments),
     GpuTime(gpu_time::Arguments),
+    GpuCode(gpu_code::Arguments),
 }
 
 /// What subcommands were called when they were flags.
@@ -83,6 +85,7 @@ pub(super) fn run(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Measurement::PaperTable(arguments)) => paper::run(&arguments),
         Some(Measurement::Stress(arguments)) => stress::run(&arguments),
         Some(Measurement::GpuTime(arguments)) => gpu_time::run(&arguments),
+        Some(Measurement::GpuCode(arguments)) => gpu_code::run(&arguments),
     }
 }
 

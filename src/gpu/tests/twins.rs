@@ -106,6 +106,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "a table made on the host",
     ),
     (
+        "stages::sharpness",
+        "planes reach variance_gain sharpen near_virtual",
+        "the host splits the composite and finds the filter's reach; the CPU walks rows",
+    ),
+    (
         "stages::motion_blur::copies",
         "of draw_copies",
         "the CPU walks rows; the GPU's kernel is in gpu.wgsl",
@@ -190,6 +195,11 @@ const OTHER_ARGUMENTS: &[(&str, &str, &str)] = &[
     (
         "stages::noise::missing",
         "sigma_of bin_of missing_sigma",
+        "a shader finds settings and planes bound",
+    ),
+    (
+        "stages::sharpness",
+        "sharpened",
         "a shader finds settings and planes bound",
     ),
     (

@@ -316,6 +316,13 @@ const TRACES: &[Trace] = &[
         ..ADVANCE
     },
     Trace {
+        feature: "shallow_trees",
+        kernel: "kernel_trace",
+        with: &["STACK_LEVELS: u32 = accel_trace__SHALLOW_LEVELS"],
+        without: &["STACK_LEVELS: u32 = accel_trace__MOST_LEVELS"],
+        ..ADVANCE
+    },
+    Trace {
         feature: "facets",
         with: &[
             "fn material_facets__kept_by_facets",

@@ -36,6 +36,8 @@ impl Scene {
             path: _,
             inputs: _,
             stages: _,
+            allowed: _,
+            focal_length_mm: _,
             photo,
             camera,
             lens,

@@ -156,6 +156,26 @@ pub fn load_animated(path: &Path, animation: Option<&str>) -> Result<GltfScene, 
     load_within(path, animation, None)
 }
 
+/// Names of its animations, or their numbers where they have none.
+///
+/// # Errors
+/// As [`load_gltf`].
+pub fn animation_names(path: &Path) -> Result<Vec<String>, GltfError> {
+    let names = || {
+        let container = container::read_container(path)?;
+        let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        let animations = Document::new(container, folder)?.animations()?;
+        let named = animations.into_iter().enumerate();
+        Ok(named
+            .map(|(i, a)| a.name.unwrap_or_else(|| i.to_string()))
+            .collect())
+    };
+    names().map_err(|problem| GltfError {
+        path: path.to_path_buf(),
+        problem,
+    })
+}
+
 /// [`load_animated`] of a file all of whose buffers and images lie in the sandbox.
 pub(super) fn load_within(
     path: &Path,

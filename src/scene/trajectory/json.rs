@@ -137,7 +137,8 @@ fn read_entry(
     })
 }
 
-fn read_pose(pose: &Value) -> Problem<Option<DMat4>> {
+/// A matrix of rows; `None`: null.
+pub(super) fn read_pose(pose: &Value) -> Problem<Option<DMat4>> {
     if pose.is_null() {
         return Ok(None);
     }

@@ -102,6 +102,10 @@ fn coefficients(table: &Object, is_fisheye: bool) -> Problem<[Option<f64>; 12]> 
     let mut found = [None; 12];
     let named = match table.get("distortion") {
         None => table,
+        // Said in words.
+        Some(Value::String(text)) if text.to_ascii_lowercase().starts_with("none") => {
+            return Ok(found);
+        }
         Some(Value::Object(named)) => named,
         Some(Value::Array(values)) if [4, 5, 8, 12].contains(&values.len()) => {
             // A fisheye's four are k1 to k4.

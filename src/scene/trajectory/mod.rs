@@ -3,6 +3,7 @@
 //! Read by content: a scene-like TOML file or JSON of this program, `transforms.json` of nerfstudio, COLMAP's models, KITTI's poses, TUM trajectories. Poses
 //! become world-from-camera in metres, the camera looking along its -Z with +Y up, whatever the file's own axes.
 
+mod camera_file;
 mod colmap;
 mod colmap_binary;
 mod frame_name;
@@ -20,6 +21,7 @@ mod tests;
 mod toml;
 mod tum;
 
+pub use camera_file::{CameraFile, PixelOrigin, read_camera};
 pub use frame_name::{FrameName, Naming};
 pub(crate) use intrinsics::half_view;
 pub use intrinsics::{Focal, Intrinsics};
@@ -237,7 +239,10 @@ fn numbers<const N: usize>(words: &[&str], what: &str) -> std::result::Result<[f
 }
 
 /// World-from-camera of rows, made exactly rigid.
-fn pose_of_rows(rows: [[f64; 4]; 4]) -> std::result::Result<DMat4, String> {
+///
+/// # Errors
+/// Why they are no rotation and translation.
+pub(crate) fn pose_of_rows(rows: [[f64; 4]; 4]) -> std::result::Result<DMat4, String> {
     for x in rows.as_flattened() {
         finite(*x, "an element of the pose")?;
     }

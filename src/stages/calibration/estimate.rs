@@ -52,21 +52,21 @@ impl Estimator {
 
 /// Weighted sums of one bin, channel and group.
 #[derive(Clone, Copy, Debug, Default)]
-struct Sum {
+pub(super) struct Sum {
     /// Pixels.
-    pixels: f64,
+    pub pixels: f64,
     /// Sum over pixels of the variance, DN^2.
-    variance: f64,
+    pub variance: f64,
     /// Sum over pixels of (frames - 1): independent values.
-    values: f64,
+    pub values: f64,
     /// Sum over pixels of quantum^2.
-    quantum2: f64,
+    pub quantum2: f64,
     /// Sum over pixels of frames.
-    samples: u64,
+    pub samples: u64,
 }
 
 impl Sum {
-    fn add(&mut self, other: &Self) {
+    pub(super) fn add(&mut self, other: &Self) {
         self.pixels += other.pixels;
         self.variance += other.variance;
         self.values += other.values;
@@ -298,14 +298,14 @@ fn jackknife_error(groups: &[Sum; GROUPS], all: &Sum) -> f64 {
 }
 
 /// Sum of squared correlations over the whole plane, from the half that is measured.
-fn squared_lags(lags: &Autocorrelation) -> f64 {
+pub(super) fn squared_lags(lags: &Autocorrelation) -> f64 {
     let first: f64 = lags[0].iter().map(|rho| rho * rho).sum();
     let others: f64 = lags[1..].as_flattened().iter().map(|rho| rho * rho).sum();
     first + 2.0 * others
 }
 
 /// Variance linear between the nearest measured bins on both sides, or that of the only neighbour.
-fn fill_from_neighbours(bins: &mut [NoiseBin], c: usize) {
+pub(super) fn fill_from_neighbours(bins: &mut [NoiseBin], c: usize) {
     let measured: Vec<(usize, f64)> = bins
         .iter()
         .enumerate()
@@ -328,7 +328,7 @@ fn fill_from_neighbours(bins: &mut [NoiseBin], c: usize) {
 }
 
 /// sigma^2 = a y + b by least squares, each level weighted by what is known of its variance. A single level fixes b alone.
-fn fit_levels(levels: &[Sum]) -> NoiseFit {
+pub(super) fn fit_levels(levels: &[Sum]) -> NoiseFit {
     let points: Vec<(f64, f64, f64)> = levels
         .iter()
         .enumerate()

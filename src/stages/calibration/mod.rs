@@ -22,11 +22,13 @@ mod frames;
 mod moments;
 pub mod quantisation;
 mod report;
+mod single;
 #[cfg(test)]
 mod tests;
 
 pub use frames::{SceneFrames, group_frames};
 pub use report::report_html;
+pub use single::estimate_from_one;
 
 use std::path::PathBuf;
 
@@ -69,6 +71,12 @@ pub enum CalibrationError {
         path.display()
     )]
     Moving { path: PathBuf, share_percent: f64 },
+    #[error("its values are linear; expected a photograph as the camera stored it (PNG or JPEG)")]
+    NoCodes,
+    #[error(
+        "it has no flat, unclipped part of 24 x 24 pixels at a level often enough; expected a photograph with sky, wall or the like; calibrate from several frames"
+    )]
+    NothingFlat,
     #[error("hardly a pixel is free of clipping: expected scenes neither black nor overexposed")]
     Clipped,
     #[error("{0} bins: expected a power of two, at most {MAX_BINS}")]

@@ -59,7 +59,9 @@ fn run(shot: &mut Shot, gpu: Option<&GpuStages>) -> Result<(), GpuError> {
             *value = [*r, *g, *b];
         }
     }
-    shot.blurred_mask = Some(canvas.iter().map(|pixel| pixel[3]).collect());
+    shot.changed_mask = Some(canvas.iter().map(|pixel| pixel[3]).collect());
+    // Copies average the estimate's own noise away.
+    shot.estimate_gain = 0.0;
     Ok(())
 }
 

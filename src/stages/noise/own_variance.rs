@@ -22,7 +22,7 @@ const SPREAD: f32 = 50.0;
 const NEGLIGIBLE: f32 = 0.02;
 
 /// Variance of `picture`, linear, that stems from the rendering; 0 where a single sample says nothing about it. `ratio` is what the quotient
-/// composite multiplied the photograph with, None for the additive one. `camera_sigma_dn` is the camera's smallest sigma: what is far below it is
+/// composite multiplied the photograph with, None for the additive one; `gain` what stages have multiplied the variance with since. `camera_sigma_dn` is the camera's smallest sigma: what is far below it is
 /// only roughly estimated.
 pub fn own_variance(
     film: &Film,
@@ -30,6 +30,7 @@ pub fn own_variance(
     photo: Option<&Photo>,
     ratio: Option<&[[f32; 3]]>,
     sampler: SamplerKind,
+    gain: f32,
     camera_sigma_dn: f32,
 ) -> Vec<[f32; 3]> {
     let mut plane = variance(film, photo);
@@ -47,7 +48,7 @@ pub fn own_variance(
                 let index = y * width + x;
                 let gain = match film.pixels[index].n {
                     0 | 1 => 0.0,
-                    n => stratification_gain(sampler, n),
+                    n => gain * stratification_gain(sampler, n),
                 };
                 *variance = variance.map(|v| v * gain);
                 if !is_negligible(variance, &picture.linear[index], camera_sigma_dn) {

@@ -2,9 +2,7 @@
 
 use super::own_variance::own_variance;
 use super::{NoiseInput, NoiseMethod, NoiseSettings, NoiseStage, field, gpu, kernel};
-use crate::film::{Film, Means};
 use crate::gpu::GpuError;
-use crate::scene::Composite;
 use crate::stages::GpuStages;
 use crate::stages::finish::{Shot, Stage};
 
@@ -27,16 +25,16 @@ fn run(shot: &mut Shot, gpu: Option<&GpuStages>) -> Result<(), GpuError> {
     };
     let stage = NoiseStage::new(settings, scene.settings.seed);
     let photo = scene.photo.as_ref();
-    let ratio = ratio(shot.film, scene.settings.composite);
-    // Copies average the estimate's own noise away.
-    let is_blurred = shot.blurred_mask.is_some();
-    let variance = (settings.method == NoiseMethod::Missing && !is_blurred).then(|| {
+    let ratio = shot.ratio();
+    let has_own = settings.method == NoiseMethod::Missing && shot.estimate_gain > 0.0;
+    let variance = has_own.then(|| {
         own_variance(
             shot.film,
             &shot.picture,
             photo,
             ratio.as_deref(),
             scene.settings.sampler,
+            shot.estimate_gain,
             smallest_sigma(settings),
         )
     });
@@ -55,22 +53,6 @@ fn run(shot: &mut Shot, gpu: Option<&GpuStages>) -> Result<(), GpuError> {
             Ok(())
         }
     }
-}
-
-/// What the quotient composite multiplied the photograph with; None for the additive one, which leaves it as it is.
-fn ratio(film: &Film, composite: Composite) -> Option<Vec<[f32; 3]>> {
-    if composite == Composite::Additive {
-        return None;
-    }
-    let ratios = (0..film.pixels.len()).map(|pixel| {
-        let sums = film.sums(pixel);
-        if sums.n == 0 || sums.n_real == 0 {
-            return [1.0; 3];
-        }
-        let ratio = Means::of(&sums).quotient().max(glam::DVec3::ZERO);
-        ratio.as_vec3().to_array()
-    });
-    Some(ratios.collect())
 }
 
 /// DN, over bins and channels.

@@ -49,6 +49,7 @@ const OF_MEASURING: [&str; 16] = [
 
 /// Measures `direct` without each of its savings in turn, beside what `mixray bench SCENE...` measures
 #[derive(Debug, Args)]
+#[group(id = "rows")]
 pub(super) struct Arguments {
     /// Scene files
     #[arg(value_name = "SCENE")]

@@ -1,0 +1,98 @@
+//! What a scene says that can hardly be meant, one line each: the problem and its mend. Nothing here ends a render.
+//!
+//! Heights are along +Y. Objects that move are not asked where they stand.
+
+mod frame;
+mod lights;
+mod standing;
+
+use std::fmt;
+
+use crate::scene::check::Check;
+use crate::scene::{Choice, Exposure, Scene};
+
+/// Stops by which "auto" would change the exposure, above which it is told.
+const LARGE_EV: f64 = 1.0;
+/// The same downwards where the proxy's albedo comes from the photograph, which may be dark: "auto" takes 0.5 for it.
+const DARK_EV: f64 = 3.0;
+
+/// One warning.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
+    pub check: Check,
+    /// "problem; mend".
+    pub message: String,
+}
+
+impl Finding {
+    fn new(check: Check, message: String) -> Self {
+        Self { check, message }
+    }
+}
+
+/// The message, and how to silence it.
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { check, message } = self;
+        let name = check.name();
+        write!(f, "{message} (meant so: [check] allow = [\"{name}\"])")
+    }
+}
+
+/// What of the scene is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// All of it: a still from the scene's own camera.
+    Still,
+    /// Without the camera, which a trajectory brings.
+    WithoutCamera,
+}
+
+/// All findings that the scene does not allow, without the exposure, which asks for rays: [`exposure`].
+pub fn scene(scene: &Scene, extent: Extent) -> Vec<Finding> {
+    let mut findings = lights::findings(scene);
+    findings.extend(standing::findings(scene));
+    if extent == Extent::Still {
+        findings.extend(frame::findings(scene));
+    }
+    findings.retain(|finding| !scene.allowed.contains(&finding.check));
+    findings
+}
+
+/// That the light does not fit the photograph; `fitted_ev` is what "auto" would take.
+pub fn exposure(scene: &Scene, fitted_ev: Option<f64>) -> Option<Finding> {
+    let (Exposure::Ev(ev), Some(fitted_ev)) = (scene.settings.exposure, fitted_ev) else {
+        return None;
+    };
+    let off = fitted_ev - ev;
+    let least = match scene.objects.iter().any(|object| object.albedo_from_photo) {
+        true => -DARK_EV,
+        false => -LARGE_EV,
+    };
+    if (least..=LARGE_EV).contains(&off) || scene.allowed.contains(&Check::Exposure) {
+        return None;
+    }
+    let what = match off > 0.0 {
+        true => "weak",
+        false => "strong",
+    };
+    let finding = format!(
+        "the light is {:.1} stops too {what} for the photograph: set exposure_ev = {fitted_ev:.1} or \"auto\" in [photo], or the strength of the lights",
+        off.abs()
+    );
+    Some(Finding::new(Check::Exposure, finding))
+}
+
+/// A length for people, metres.
+struct Metres(f64);
+
+impl fmt::Display for Metres {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            m if m < 0.01 => write!(f, "{:.1} mm", m * 1e3),
+            m if m < 1.0 => write!(f, "{:.1} cm", m * 1e2),
+            m if m < 1e4 => write!(f, "{m:.1} m"),
+            m => write!(f, "{m:.1e} m"),
+        }
+    }
+}
