@@ -255,6 +255,7 @@ fn frame(distortion: Distortion, aperture: Aperture, aperture_radius_m: f64) -> 
         focus_distance_m: 1.2,
         aperture,
         blade_rotation_deg: 20.0,
+        focal_length_m: 0.0,
     };
     let mut frame = Frame::zeroed();
     frame_camera(&camera, &lens, DVec3::ZERO, &mut frame);

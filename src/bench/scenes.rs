@@ -26,6 +26,7 @@ pub(super) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -
             focus_distance_m: f64::INFINITY,
             aperture: Aperture::Disc,
             blade_rotation_deg: 0.0,
+            focal_length_m: 0.0,
         },
         environment: None,
         lights: Vec::new(),

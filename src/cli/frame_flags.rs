@@ -17,7 +17,7 @@ pub(super) struct FrameFlags {
     /// Folder of pictures, .y4m file, file of JPEG pictures one after the other, or - for Y4M on standard input
     #[arg(long, value_name = "PATH")]
     pub frames: Option<PathBuf>,
-    /// OpenCV calibration (YAML) in place of the intrinsics of trajectory and scene
+    /// Calibration of OpenCV, ROS or Kalibr (YAML) in place of the intrinsics of trajectory and scene
     #[arg(long, value_name = "FILE")]
     pub intrinsics: Option<PathBuf>,
     /// Pictures of a folder [default: png; in a pattern its own]

@@ -11,7 +11,7 @@ use super::summary::combination;
 use super::values::png_bits;
 use super::{Failure, Outcome, say, summarize};
 use crate::film::Film;
-use crate::output::{ExrLayers, FilmNote, PngBits, Target, read_film};
+use crate::output::{ExrLayer, ExrLayers, FilmNote, Format, PngBits, Target, read_film};
 use crate::renderer::{Progress, Renderer, Watcher};
 use crate::scene::sandbox::Sandbox;
 use crate::scene::{BackendChoice, Scene};
@@ -25,9 +25,13 @@ pub(super) struct Arguments {
     /// Parts (.exr)
     #[arg(required = true)]
     parts: Vec<PathBuf>,
-    /// Picture to write, .png or .exr with all planes (an incomplete range stays mergeable); may be given several times
+    /// Picture to write, .png or .exr (an incomplete range stays mergeable); may be given several times
     #[arg(short, long, value_name = "OUT", required = true)]
     output: Vec<PathBuf>,
+    /// Layers of .exr pictures, as those of `mixray render`; for real and mixed the rays that the parts lack are traced, all of them unless the
+    /// parts were rendered with these layers
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    layers: Vec<ExrLayer>,
     /// Scene file [default: where it was, seen from the first part, when that was rendered]
     #[arg(long)]
     scene: Option<PathBuf>,
@@ -74,10 +78,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let total = first.note.total;
     let bar = Bar::new("building trees", "rays per pixel");
     let hear = |progress: &Progress| bar.hear(progress);
+    let layers = ExrLayers::new(&arguments.layers);
+    let is_exr = targets.iter().any(|target| target.format() == Format::Exr);
     let renderer = Renderer::with_film(
         scene,
         film,
         range.1,
+        is_exr && layers.need_real_everywhere(),
         first.note.without,
         &Watcher::none().heard_by(&hear),
     )?;
@@ -86,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let moved = write(
         &renderer,
         &targets,
-        &ExrLayers::all(),
+        &layers,
         arguments.png_bits,
         arguments.frame,
         (!complete).then_some(range),

@@ -196,7 +196,7 @@ fn run_calibrate(arguments: &Calibrate) -> Result<Outcome, Failure> {
 }
 
 fn run_estimate(arguments: &Estimate) -> Result<Outcome, Failure> {
-    check_writable(&arguments.output)?;
+    check_writable_as(&arguments.output, "toml")?;
     let photo = read_photo(&arguments.photo)?;
     let name = arguments.photo.display().to_string();
     let size = (photo.width, photo.height);

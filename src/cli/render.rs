@@ -33,13 +33,8 @@ pub(super) struct Arguments {
     output: Vec<PathBuf>,
     /// Layers of .exr pictures, with commas between: composite, virtual, change, ratio, noise, mask, depth, normal, variance, samples, which
     /// are the default, difference, albedo, real, mixed. real and mixed ask for the real light everywhere, which may cost several times the
-    /// rest [default with --range: all]
-    #[arg(
-        long,
-        value_name = "NAME,...",
-        value_delimiter = ',',
-        conflicts_with = "range"
-    )]
+    /// rest
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     layers: Vec<ExrLayer>,
     #[command(flatten)]
     flags: PictureFlags,
@@ -138,13 +133,10 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let load_secs = start.elapsed().as_secs_f64();
 
     let is_exr = targets.iter().any(|t| t.format() == Format::Exr);
-    // A film that goes on has everything that it may be asked for.
-    let layers = match job.range {
-        Some(_) => ExrLayers::all(),
-        None => ExrLayers::new(&job.layers),
-    };
+    let layers = ExrLayers::new(&job.layers);
     let options = RendererOptions {
-        guides: is_exr && layers.need_guides(),
+        // A film has what merge cannot make up for.
+        guides: is_exr && (layers.need_guides() || job.range.is_some()),
         real_everywhere: is_exr && layers.need_real_everywhere(),
         sample_range: job.range,
         without: job.flags.without(),
@@ -160,7 +152,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     {
         drop(bar);
         let (from, to) = range;
-        print(&format!(
+        summarize(&format!(
             "picture {} kept (rays {from}..{to} per pixel)\n",
             target.path().display()
         ))?;

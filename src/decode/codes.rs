@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::sync::Arc;
 
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
 
 use super::jpeg::{MAX_SCANS, outline, with_standard_tables};
 use super::png::colour_chunks;
@@ -16,10 +16,12 @@ use super::{ALPHA, ImageFile, Pixels, Rgba8, Tags, broken, check_size, ensure_me
 const LINEAR_BYTES: u64 = 12;
 /// Of the coefficients that a JPEG decoder keeps a pixel, at most.
 const COEFFICIENT_BYTES: u64 = 8;
+/// What stands for lost codes, in each of their bytes.
+const GREY: u8 = 128;
 
 pub(super) fn read_png(bytes: &[u8]) -> Result<ImageFile, String> {
     let chunks = colour_chunks(bytes);
-    let mut image = read_codes(bytes, ImageFormat::Png, chunks.cicp)?;
+    let mut image = read_codes(bytes, ImageFormat::Png, chunks.cicp, false)?;
     let is_told = image.tags.profile.is_some() || image.warnings.iter().any(|w| w == PROFILE);
     if chunks.has_other_colours && chunks.cicp.is_none() && !is_told {
         let warning = "its gamma and primaries are ignored: it is read as sRGB".to_owned();
@@ -29,7 +31,43 @@ pub(super) fn read_png(bytes: &[u8]) -> Result<ImageFile, String> {
 }
 
 pub(super) fn read_jpeg(bytes: &[u8]) -> Result<ImageFile, String> {
-    read_codes(&checked_jpeg(bytes)?, ImageFormat::Jpeg, None)
+    read_codes(&checked_jpeg(bytes)?, ImageFormat::Jpeg, None, false)
+}
+
+/// What can be decoded of a PNG file that is cut off; the rest is grey.
+pub(super) fn read_cut_png(bytes: &[u8]) -> Result<ImageFile, String> {
+    let cicp = colour_chunks(bytes).cicp;
+    read_codes(bytes, ImageFormat::Png, cicp, true)
+}
+
+/// A PNG decoder that keeps the rows before a fault.
+struct Cut<D>(D);
+
+impl<D: ImageDecoder> ImageDecoder for Cut<D> {
+    fn dimensions(&self) -> (u32, u32) {
+        self.0.dimensions()
+    }
+
+    fn color_type(&self) -> ColorType {
+        self.0.color_type()
+    }
+
+    fn read_image(self, codes: &mut [u8]) -> ImageResult<()> {
+        let colour = self.0.color_type();
+        let is_wide = colour.bytes_per_pixel() == 2 * colour.channel_count();
+        codes.fill(GREY);
+        if self.0.read_image(codes).is_err() && is_wide {
+            // The decoder turns the file's order of bytes to the machine's at its end.
+            for code in codes.as_chunks_mut::<2>().0 {
+                *code = u16::from_be_bytes(*code).to_ne_bytes();
+            }
+        }
+        Ok(())
+    }
+
+    fn read_image_boxed(self: Box<Self>, codes: &mut [u8]) -> ImageResult<()> {
+        (*self).read_image(codes)
+    }
 }
 
 /// What can be decoded of a JPEG picture that is cut off; the rest is grey.
@@ -58,11 +96,12 @@ fn checked_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
 
 const PROFILE: &str = "its colour profile is not understood: it is read as sRGB";
 
-/// `cicp` wins over an ICC profile.
+/// `cicp` wins over an ICC profile; of what `is_cut` off, the rows before are kept.
 fn read_codes(
     bytes: &[u8],
     format: ImageFormat,
     cicp: Option<[u8; 4]>,
+    is_cut: bool,
 ) -> Result<ImageFile, String> {
     let (mut decoder, (width, height)) = open(bytes, format)?;
     let codes = match decoder.color_type().bytes_per_pixel() / decoder.color_type().channel_count()
@@ -84,7 +123,11 @@ fn read_codes(
         Some(Err(Unused::IsSrgb)) | None => {}
     }
     tags.orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let decoded = DynamicImage::from_decoder(decoder).map_err(broken)?;
+    let decoded = match is_cut {
+        true => DynamicImage::from_decoder(Cut(decoder)),
+        false => DynamicImage::from_decoder(decoder),
+    }
+    .map_err(broken)?;
     let alpha = alpha_of(&decoded);
     if !alpha.is_empty() {
         warnings.push(ALPHA.to_owned());

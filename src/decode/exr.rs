@@ -115,6 +115,17 @@ pub(super) fn read_picture(
         .map(into_f32)
         .collect();
     let data = header.data_window();
+    let meets = |axis: fn(&Vec2<i32>) -> i32| {
+        let end = |bounds: IntegerBounds| axis(&bounds.max());
+        axis(&data.position) <= end(window) && axis(&window.position) <= end(data)
+    };
+    if !(meets(|p| p.0) && meets(|p| p.1)) {
+        return Err(format!(
+            "its data window {} lies outside of its display window {}; expected a picture in the display window; render the frame again",
+            shown(data),
+            shown(window)
+        ));
+    }
     if data != window {
         warnings.push(format!(
             "its data window {} is not its display window {}: it is placed there, the rest is black",

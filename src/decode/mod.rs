@@ -106,10 +106,11 @@ pub(crate) fn decode_image(bytes: &[u8]) -> Result<ImageFile, String> {
     decode_layer(bytes, None, false)
 }
 
-/// What can be decoded of an image file's bytes that are cut off: of JPEG what there is, of other formats nothing.
+/// What can be decoded of an image file's bytes that are cut off, grey behind: of JPEG and PNG what there is, of other formats nothing.
 pub(crate) fn decode_cut_image(bytes: &[u8]) -> Option<ImageFile> {
     match bytes {
         [0xff, 0xd8, ..] => guarded(|| codes::read_cut_jpeg(bytes)).ok()?.ok(),
+        [0x89, b'P', b'N', b'G', ..] => guarded(|| codes::read_cut_png(bytes)).ok()?.ok(),
         _ => None,
     }
 }

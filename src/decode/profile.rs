@@ -13,6 +13,9 @@ const CODES: usize = 1 << 16;
 /// Matrices that differ by less are one: those of sRGB profiles differ by their rounding.
 const SAME_MATRIX: f64 = 3e-3;
 
+/// XYZ of the profiles' white, in units of 1/65536.
+const D50: [u32; 3] = [0xf6d6, 0x1_0000, 0xd32d];
+
 /// From codes to linear Rec.709 and back.
 pub struct ColourProfile {
     /// What goes on to pictures that keep the codes.
@@ -80,9 +83,11 @@ impl ColourProfile {
             let text = LocalizableString::new("en".into(), "US".into(), value.into());
             Some(ProfileText::Localizable(vec![text]))
         };
-        profile.description = text("Colours of the photograph");
-        profile.copyright = text("Public domain");
-        let icc = profile.encode().map_err(|_| Unused::NotUnderstood)?;
+        // Of even lengths, so that the tags behind begin at multiples of four.
+        profile.description = text("Colours of the photographs");
+        profile.copyright = text("In the public domain");
+        let mut icc = profile.encode().map_err(|_| Unused::NotUnderstood)?;
+        make_strict(&mut icc).ok_or(Unused::NotUnderstood)?;
         Self::of_profile(&profile, icc)
     }
 
@@ -145,6 +150,19 @@ impl ColourProfile {
             (below as f64 + next) / (CODES - 1) as f64
         })
     }
+}
+
+/// What strict readers of ICC.1:2022 ask for and the crate leaves out: a length that is a multiple of four, and D50 to the last bit.
+fn make_strict(icc: &mut Vec<u8>) -> Option<()> {
+    icc.resize(icc.len().next_multiple_of(4), 0);
+    let length = u32::try_from(icc.len()).ok()?;
+    icc.get_mut(..4)?.copy_from_slice(&length.to_be_bytes());
+    for (place, word) in D50.into_iter().enumerate() {
+        let at = 68 + 4 * place;
+        icc.get_mut(at..at + 4)?
+            .copy_from_slice(&word.to_be_bytes());
+    }
+    Some(())
 }
 
 impl fmt::Debug for ColourProfile {

@@ -37,7 +37,7 @@ impl ExrLayer {
         ("mixed", Self::Mixed),
     ];
 
-    /// What a compositor needs and costs no rays beyond those of the composite.
+    /// What a compositor needs, without light that the composite does not take: depth and normal cost each ray its first hit.
     const USUAL: [Self; 10] = [
         Self::Composite,
         Self::Virtual,
@@ -75,10 +75,6 @@ impl ExrLayers {
             [] => Self(ExrLayer::USUAL.to_vec()),
             asked => Self(asked.to_vec()),
         }
-    }
-
-    pub fn all() -> Self {
-        Self(ExrLayer::NAMES.map(|(_, layer)| layer).to_vec())
     }
 
     /// Real rays are traced where nothing virtual needs them.

@@ -28,6 +28,7 @@ pub fn test_scene() -> Scene {
             focus_distance_m: 1.0,
             aperture: Aperture::Disc,
             blade_rotation_deg: 0.0,
+            focal_length_m: 0.0,
         },
         environment: None,
         lights: Vec::new(),

@@ -110,6 +110,12 @@ impl LensForm {
             focus_distance_m: self.focus_distance_m,
             aperture: self.aperture,
             blade_rotation_deg: self.blade_rotation_deg,
+            focal_length_m: match self.opening {
+                Opening::FNumber {
+                    focal_length_mm, ..
+                } => focal_length_mm / 1000.0,
+                Opening::RadiusM(_) => 0.0,
+            },
         }
     }
 

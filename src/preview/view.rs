@@ -198,6 +198,7 @@ mod tests {
             focus_distance_m: 2.0,
             aperture: Aperture::Disc,
             blade_rotation_deg: 0.0,
+            focal_length_m: 0.0,
         };
         assert_eq!(confusion_px(&lens, &camera, 2.0), 0.0);
         // 2 r |z - f| / (z f) fx

@@ -7,7 +7,7 @@ use crate::work::Watcher;
 
 impl Renderer {
     /// A renderer that goes on from the film of an earlier one of the same scene, settings and savings left out: it stands at the film's last sample, which
-    /// comes just before `end` in rays per pixel, and traces what edge pixels lack.
+    /// comes just before `end` in rays per pixel, and traces what edge pixels lack; `real_everywhere` as in [`RendererOptions`].
     ///
     /// # Errors
     /// As [`Renderer::new`]; or the film is of another size than the camera.
@@ -15,6 +15,7 @@ impl Renderer {
         scene: Scene,
         film: Film,
         end: u32,
+        real_everywhere: bool,
         without: Without,
         watcher: &Watcher<'_>,
     ) -> Result<Self, RenderError> {
@@ -25,7 +26,7 @@ impl Renderer {
         }
         let options = RendererOptions {
             guides: !film.guides.is_empty(),
-            real_everywhere: !film.guides.is_empty(),
+            real_everywhere,
             sample_range: Some((film.first_sample, end)),
             without,
             ..RendererOptions::default()

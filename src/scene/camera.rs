@@ -7,8 +7,9 @@ use super::error::Result;
 use super::pose::read_camera_pose;
 use super::projection::check_distortion;
 use super::reader::{Node, Table};
-use super::trajectory::{Intrinsics, PixelOrigin, read_camera};
-use super::{Aperture, Camera, Distortion, Lens, Photo};
+use super::trajectory::{Intrinsics, PixelOrigin, half_view, read_camera};
+use super::{Aperture, Camera, Distortion, EXPECTED_FOCUS, Lens, Photo};
+use crate::distortion::LENS_FISHEYE;
 
 const CAMERA_KEYS: &[&str] = &[
     "width",
@@ -100,7 +101,9 @@ pub(super) fn read_camera_table(
             "lower `width` or `height`",
         ));
     }
-    let (fx, fy) = read_focal_lengths(&table, f64::from(height))?;
+    let distortion = read_distortion(&table)?.unwrap_or(Distortion::NONE);
+    let is_fisheye = distortion.model == LENS_FISHEYE;
+    let (fx, fy) = read_focal_lengths(&table, f64::from(height), is_fisheye)?;
     let half = |side: u32| f64::from(side) * 0.5;
     let camera = Camera {
         width,
@@ -109,7 +112,7 @@ pub(super) fn read_camera_table(
         fy,
         cx: table.optional("cx", Node::finite)?.unwrap_or(half(width)),
         cy: table.optional("cy", Node::finite)?.unwrap_or(half(height)),
-        distortion: read_distortion(&table)?.unwrap_or(Distortion::NONE),
+        distortion,
         world_from_camera: read_camera_pose(&table)?,
     };
     check_distortion(&camera).map_err(|problem| {
@@ -207,7 +210,7 @@ fn read_side(table: &Table, key: &str, photo_side: Option<u32>) -> Result<u32> {
 }
 
 /// Pixels. One of `fx` and `fy` alone means square pixels.
-fn read_focal_lengths(table: &Table, height: f64) -> Result<(f64, f64)> {
+fn read_focal_lengths(table: &Table, height: f64, is_fisheye: bool) -> Result<(f64, f64)> {
     table.refuse_both("fx", "vertical_fov_deg")?;
     table.refuse_both("fy", "vertical_fov_deg")?;
     let fx = table.optional("fx", Node::positive)?;
@@ -216,7 +219,7 @@ fn read_focal_lengths(table: &Table, height: f64) -> Result<(f64, f64)> {
         let expected = "degrees above 0 and below 180";
         // Beyond these the focal length leaves the range in which f32 can divide by it.
         let fov = node.number(expected, |fov| (1e-4..=179.9999).contains(&fov))?;
-        Ok(height * 0.5 / (fov.to_radians() * 0.5).tan())
+        Ok(height * 0.5 / half_view(fov.to_radians() * 0.5, is_fisheye))
     })?;
     match (fx.or(fy).or(from_fov), fy.or(fx).or(from_fov)) {
         (Some(fx), Some(fy)) => Ok((fx, fy)),
@@ -245,16 +248,6 @@ pub(super) fn read_lens(root: &Table) -> Result<(Lens, Option<f64>)> {
     }
     let focal_length_mm = table.optional("focal_length_mm", Node::positive)?;
     let focal_length_m = focal_length_mm.map_or(0.0, |mm| mm / 1000.0);
-    table.optional("focus_distance_m", |node| match focus {
-        Some(focus) if focus <= focal_length_m => Err(node.error(
-            format!(
-                "`focus_distance_m` is {focus}, nearer than the focal length of {focal_length_m} m"
-            ),
-            "a distance beyond the focal length: no lens makes a picture of what is nearer",
-            "correct one of them",
-        )),
-        _ => Ok(()),
-    })?;
     let lens = Lens {
         aperture_radius_m,
         focus_distance_m: focus.unwrap_or(pinhole.focus_distance_m),
@@ -264,7 +257,14 @@ pub(super) fn read_lens(root: &Table) -> Result<(Lens, Option<f64>)> {
         blade_rotation_deg: table
             .optional("blade_rotation_deg", Node::finite)?
             .unwrap_or(0.0),
+        focal_length_m,
     };
+    table.optional("focus_distance_m", |node| {
+        match lens.focus_problem(lens.focus_distance_m) {
+            Some(problem) => Err(node.error(problem, EXPECTED_FOCUS, "correct one of them")),
+            None => Ok(()),
+        }
+    })?;
     Ok((lens, focal_length_mm))
 }
 

@@ -133,6 +133,8 @@ pub struct Lens {
     pub focus_distance_m: f64,
     pub aperture: Aperture,
     pub blade_rotation_deg: f64,
+    /// Of the glass, 0 where it is not told: nothing as near as this can be in focus.
+    pub focal_length_m: f64,
 }
 
 impl Lens {
@@ -142,8 +144,23 @@ impl Lens {
         focus_distance_m: f64::INFINITY,
         aperture: Aperture::Disc,
         blade_rotation_deg: 0.0,
+        focal_length_m: 0.0,
     };
+
+    /// Why the lens cannot be focused at this distance; `None`: it can.
+    pub(crate) fn focus_problem(&self, focus_distance_m: f64) -> Option<String> {
+        (focus_distance_m <= self.focal_length_m).then(|| {
+            format!(
+                "`focus_distance_m` is {focus_distance_m}, nearer than the focal length of {} m",
+                self.focal_length_m
+            )
+        })
+    }
 }
+
+/// What a lens is expected to be focused at.
+pub(crate) const EXPECTED_FOCUS: &str =
+    "a distance beyond the focal length: no lens makes a picture of what is nearer";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aperture {

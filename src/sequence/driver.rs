@@ -10,7 +10,7 @@ use super::plan::{Files, in_part, in_range};
 use super::report::{FrameCounts, SequenceSeconds, SequenceStats};
 use super::whole::{Whole, open_source, output_of};
 use super::{Event, SequenceError, SequenceOptions};
-use crate::output::{ExrLayers, ExrPicture, Format, Metadata};
+use crate::output::{ExrLayers, ExrPicture, Metadata};
 use crate::pack::next_anchor;
 use crate::renderer::{
     Budget, Delivered, ErrorGoal, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions,
@@ -19,7 +19,7 @@ use crate::renderer::{
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{Camera, Lens, MotionBlurMethod, Scene};
 use crate::stages::{Finished, GpuStages, finish, finish_with_noise};
-use crate::video::{FrameOutput, FrameSink, Header, Pixels, SinkPlan, Taken, VideoFrame};
+use crate::video::{FrameSink, Header, Pixels, SinkPlan, Taken, VideoFrame};
 
 /// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
 const REACH_FRAMES: f64 = 1.5;
@@ -53,6 +53,7 @@ pub fn render_sequence(
         whole,
         hear,
         told: HashSet::new(),
+        lost: Vec::new(),
         started: None,
         anchor: None,
         frames: FrameCounts::default(),
@@ -113,6 +114,8 @@ struct Sequence<'a> {
     hear: &'a dyn Fn(&Event<'_>),
     /// Warnings of frames.
     told: HashSet<String>,
+    /// Frames before the first of which anything is there.
+    lost: Vec<FrameName>,
     started: Option<Started>,
     /// The coordinates' origin: the same for every frame whichever run renders it.
     anchor: Option<DVec3>,
@@ -351,8 +354,7 @@ impl Sequence<'_> {
         Ok(true)
     }
 
-    /// A frame of which a part is lost goes on as it is, or is left out where there is nothing of it: so the others keep their names, and in
-    /// a film their places.
+    /// A frame of which a part is lost goes on as far as it is there; where nothing is, the one before keeps its place.
     fn pass_damaged(
         &mut self,
         name: &FrameName,
@@ -366,14 +368,17 @@ impl Sequence<'_> {
         let reason = problem.split("; ").next().unwrap_or(problem);
         let tell = |what: &str| (self.hear)(&Event::Warning(format!("{reason}; {what}")));
         let Some(frame) = rest else {
-            if let Some(started) = &mut self.started
-                && started.sink.repeat()?
-            {
-                tell("the frame before stands for it");
-                self.frames.passed_through += 1;
-            } else {
-                tell("the frame is left out");
+            match &mut self.started {
+                Some(started) => {
+                    tell("the frame before stands for it");
+                    started.sink.stand_in(name)?;
+                }
+                None => {
+                    tell("grey stands for it");
+                    self.lost.push(name.clone());
+                }
             }
+            self.frames.passed_through += 1;
             return Ok(());
         };
         tell("the frame passes through");
@@ -403,7 +408,7 @@ impl Sequence<'_> {
         let mut header = header.unwrap_or_else(|| Header::new(size.0, size.1, self.whole.rate));
         header.matrix = options.matrix.unwrap_or(header.matrix);
         let layers = ExrLayers::new(&options.layers);
-        let sink = FrameSink::open(SinkPlan {
+        let mut sink = FrameSink::open(SinkPlan {
             path: &options.output,
             output: self.whole.output.clone(),
             layers,
@@ -414,6 +419,9 @@ impl Sequence<'_> {
             overwrite: options.overwrite,
             names: self.whole.names_of_part().unwrap_or_default(),
         })?;
+        for name in &self.lost {
+            sink.stand_in(name)?;
+        }
         Ok(Started {
             sink,
             scene_hash: scene.fingerprint(),

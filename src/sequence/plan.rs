@@ -7,7 +7,7 @@ use crate::check::{self, Extent};
 use crate::scene::trajectory::{
     FrameName, FrameView, Intrinsics, Trajectory, Views, read_intrinsics,
 };
-use crate::scene::{self, Given, Object, Photo, Scene};
+use crate::scene::{self, EXPECTED_FOCUS, Given, Lens, Object, Photo, Scene};
 use crate::video::FrameSource;
 
 /// Frames a second that stand for an unknown rate, where nothing depends on it but which frame follows which.
@@ -121,6 +121,9 @@ pub(super) fn check_frames(
         )));
     };
     check_gaps(options, frames, &wanted)?;
+    if let Some(gaps) = gaps_in_time(&wanted).filter(|_| !options.allow_gaps) {
+        hear(&Event::Warning(format!("{}: {gaps}", frames.display())));
+    }
     if let Some((from, to)) = options.part
         && !wanted.iter().any(|name| in_part(options, name))
     {
@@ -185,6 +188,64 @@ fn check_gaps(
         )),
         false => Ok(()),
     }
+}
+
+/// How much longer than the usual step from one time stamp to the next a gap is.
+const GAP_STEPS: f64 = 1.75;
+/// Gaps that are named.
+const NAMED_GAPS: usize = 3;
+
+/// Where frames with time stamps follow one another later than usual; `None`: nowhere.
+fn gaps_in_time(frames: &[&FrameName]) -> Option<String> {
+    let times: Option<Vec<f64>> = frames.iter().map(|frame| frame.time_secs).collect();
+    let steps: Vec<f64> = times?.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut sorted = steps.clone();
+    sorted.sort_by(f64::total_cmp);
+    // The smaller one of two: a single long step is a gap.
+    let usual = *sorted.get(sorted.len().checked_sub(1)? / 2)?;
+    let gaps: Vec<String> = (steps.iter().zip(frames.windows(2)))
+        .filter(|(step, _)| **step > GAP_STEPS * usual)
+        .map(|(step, pair)| {
+            format!(
+                "{step:.4} s between {} and {}",
+                pair[0].label, pair[1].label
+            )
+        })
+        .collect();
+    let more = match gaps.len().saturating_sub(NAMED_GAPS) {
+        0 => String::new(),
+        more => format!(", and {more} more"),
+    };
+    (!gaps.is_empty()).then(|| {
+        format!(
+            "frames are missing: the time stamps are {usual:.4} s apart, but {}{more}; the sequence goes on without them (--allow-gaps says no word)",
+            gaps[..gaps.len().min(NAMED_GAPS)].join(", ")
+        )
+    })
+}
+
+/// The lens can be focused at all distances that it is pulled to.
+pub(super) fn check_focus(
+    options: &SequenceOptions,
+    trajectory: &Trajectory,
+    lens: &Lens,
+) -> Result<(), SequenceError> {
+    let path = trajectory.path.display();
+    let of_frames = trajectory.entries.iter().filter_map(|entry| {
+        let focus_m = entry.focus_distance_m?;
+        Some((format!("{path}: {}", entry.place), focus_m))
+    });
+    let pulled = options
+        .focus_pull_m
+        .map(|(from, to)| [from, to].map(|end| ("--focus-pull".to_owned(), end)));
+    for (place, focus_m) in pulled.into_iter().flatten().chain(of_frames) {
+        if let Some(problem) = lens.focus_problem(focus_m) {
+            return Err(SequenceError::Unfit(format!(
+                "{place}: {problem} in [lens]; expected {EXPECTED_FOCUS}; correct one of them"
+            )));
+        }
+    }
+    Ok(())
 }
 
 pub(super) fn in_range(options: &SequenceOptions, name: &FrameName) -> bool {

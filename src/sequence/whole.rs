@@ -1,6 +1,8 @@
 //! The whole render that frames are of: what they are all made with, and how its fingerprint tells it from others.
 
-use super::plan::{Files, check_frames, check_rate, in_part, in_range, known_rate, views};
+use super::plan::{
+    Files, check_focus, check_frames, check_rate, in_part, in_range, known_rate, views,
+};
 use super::{Event, SequenceError, SequenceOptions};
 use crate::output::{ExrLayers, Format, PngBits};
 use crate::scene::trajectory::{FrameName, FrameView, Views};
@@ -101,6 +103,7 @@ impl<'a> Whole<'a> {
         let given = Some(photo.clone());
         let mut scene = self.files.scene(self.options, view, given, hear)?;
         check_rate(&scene, self.rate, self.views.have_own_times())?;
+        check_focus(self.options, &self.files.trajectory, &scene.lens)?;
         let size = (photo.width, photo.height);
         // The photograph of the moment is no part of what the frames are made with.
         let size = (scene.photo.take()).map_or(size, |photo| (photo.width, photo.height));

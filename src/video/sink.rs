@@ -55,14 +55,20 @@ pub struct FrameSink {
     layers: ExrLayers,
     composite: Composite,
     header: Header,
-    /// Planes of the last frame of a film that this run has written.
-    last: Vec<u8>,
 }
 
 enum Kind {
-    Pictures(Pictures),
+    Pictures {
+        pictures: Pictures,
+        /// The last frame's file.
+        last: Option<PathBuf>,
+    },
     Y4mFile(Y4mFile),
-    Stdout(BufWriter<std::io::Stdout>),
+    Stdout {
+        out: BufWriter<std::io::Stdout>,
+        /// Planes of the last frame.
+        last: Option<Vec<u8>>,
+    },
 }
 
 impl FrameSink {
@@ -75,12 +81,15 @@ impl FrameSink {
                 let header = format!("{}\n", plan.header.line);
                 let sent = out.write_all(header.as_bytes());
                 sent.map_err(|error| Place::Stdout.error(cannot_write(&error)))?;
-                Kind::Stdout(out)
+                Kind::Stdout { out, last: None }
             }
             FrameOutput::Y4m(path) => Kind::Y4mFile(open_y4m(&plan, path)?),
             FrameOutput::Pictures(pictures) => {
                 open_folder(&plan, pictures)?;
-                Kind::Pictures(pictures.clone())
+                Kind::Pictures {
+                    pictures: pictures.clone(),
+                    last: None,
+                }
             }
         };
         Ok(Self {
@@ -89,13 +98,12 @@ impl FrameSink {
             layers: plan.layers,
             composite: plan.composite,
             header: plan.header,
-            last: Vec::new(),
         })
     }
 
     /// The colours of a film; `None`: pictures are written.
     pub fn film_colours(&self) -> Option<String> {
-        (!matches!(self.kind, Kind::Pictures(_))).then(|| self.header.colours())
+        (!matches!(self.kind, Kind::Pictures { .. })).then(|| self.header.colours())
     }
 
     /// The frame, the next in order, is finished from an earlier run, and whole. Asked once for each, before it is written; `frame` is what
@@ -105,20 +113,20 @@ impl FrameSink {
     /// Its file is one that is read, or that of another frame.
     pub fn has(&mut self, name: &FrameName, frame: &VideoFrame) -> Result<bool, VideoError> {
         match &mut self.kind {
-            Kind::Pictures(pictures) => {
+            Kind::Pictures { pictures, last } => {
                 let path = pictures.file_of(name);
                 check_named(&path)?;
-                Ok(is_whole(&path, pictures.format, frame))
+                Ok(is_whole(last.insert(path), pictures.format, frame))
             }
             Kind::Y4mFile(file) => file.has_next(),
-            Kind::Stdout(_) => Ok(false),
+            Kind::Stdout { .. } => Ok(false),
         }
     }
 
     /// The layers of EXR files, which [`FrameSink::write_exr`] writes; `None`: frames are pictures alone.
     pub fn layers(&self) -> Option<&ExrLayers> {
         match &self.kind {
-            Kind::Pictures(pictures) if pictures.format == Format::Exr => Some(&self.layers),
+            Kind::Pictures { pictures, .. } if pictures.format == Format::Exr => Some(&self.layers),
             _ => None,
         }
     }
@@ -128,7 +136,7 @@ impl FrameSink {
     /// # Errors
     /// The disk refuses.
     pub fn write_exr(&mut self, name: &FrameName, exr: &ExrPicture) -> Result<(), VideoError> {
-        if let Kind::Pictures(pictures) = &self.kind {
+        if let Kind::Pictures { pictures, .. } = &self.kind {
             let target = Target::named(&pictures.file_of(name), Format::Exr);
             write_exr(&target, exr)?;
         }
@@ -145,7 +153,7 @@ impl FrameSink {
         picture: &Picture,
         frame: &VideoFrame,
     ) -> Result<(), VideoError> {
-        if let Kind::Pictures(pictures) = &self.kind {
+        if let Kind::Pictures { pictures, .. } = &self.kind {
             let target = Target::named(&pictures.file_of(name), Format::Png);
             let photo = Some(&frame.photo);
             let bits = self.png_bits.unwrap_or_else(|| PngBits::for_photo(photo));
@@ -174,7 +182,7 @@ impl FrameSink {
             return self.write_exr(name, &exr);
         }
         match (&self.kind, &frame.pixels) {
-            (Kind::Pictures(pictures), Pixels::File(path))
+            (Kind::Pictures { pictures, .. }, Pixels::File(path))
                 if path
                     .extension()
                     .is_some_and(|e| e.eq_ignore_ascii_case("png")) =>
@@ -187,7 +195,7 @@ impl FrameSink {
                 })?;
                 Ok(write_bytes(&pictures.file_of(name), &bytes)?)
             }
-            (Kind::Y4mFile(_) | Kind::Stdout(_), Pixels::Planes(planes)) => {
+            (Kind::Y4mFile(_) | Kind::Stdout { .. }, Pixels::Planes(planes)) => {
                 self.write_planes(planes)
             }
             _ => {
@@ -203,32 +211,55 @@ impl FrameSink {
         }
     }
 
-    /// In a film the last frame once more, grey before the first; false in a folder.
+    /// The frame before once more in place of one of which nothing is left; grey before the first.
     ///
     /// # Errors
-    /// As [`FrameSink::write`].
-    pub fn repeat(&mut self) -> Result<bool, VideoError> {
-        let is_there = match &mut self.kind {
-            Kind::Pictures(_) => return Ok(false),
-            Kind::Y4mFile(file) => file.has_next()?,
-            Kind::Stdout(_) => false,
+    /// As [`FrameSink::has`] and [`FrameSink::write`].
+    pub fn stand_in(&mut self, name: &FrameName) -> Result<(), VideoError> {
+        let before = match &mut self.kind {
+            Kind::Pictures { pictures, last } => {
+                let path = pictures.file_of(name);
+                check_named(&path)?;
+                let before = last.as_ref().map(std::fs::read).transpose();
+                let before = before
+                    .map_err(|error| Place::File(path.clone()).error(cannot_write(&error)))?;
+                match before {
+                    Some(bytes) => write_bytes(&path, &bytes)?,
+                    None if pictures.format == Format::Exr => {
+                        let photo = grey_photo(&self.header);
+                        let exr = ExrPicture::untouched(&photo, self.composite, &self.layers);
+                        self.write_exr(name, &exr)?;
+                    }
+                    None => {
+                        let target = Target::named(&path, Format::Png);
+                        let photo = grey_photo(&self.header);
+                        let picture = Picture {
+                            width: photo.width,
+                            height: photo.height,
+                            linear: photo.linear,
+                        };
+                        write_png(&target, &picture, None, PngBits::Eight)?;
+                    }
+                }
+                return Ok(());
+            }
+            Kind::Y4mFile(file) => match file.has_next()? {
+                true => return Ok(()),
+                false => file.last()?,
+            },
+            Kind::Stdout { last, .. } => last.take(),
         };
-        if !is_there {
-            let mut planes = std::mem::take(&mut self.last);
-            planes.resize(self.header.frame_bytes(), GREY);
-            self.write_planes(&planes)?;
-        }
-        Ok(true)
+        self.write_planes(&before.unwrap_or_else(|| vec![GREY; self.header.frame_bytes()]))
     }
 
     fn write_planes(&mut self, planes: &[u8]) -> Result<(), VideoError> {
-        self.last = planes.to_vec();
         match &mut self.kind {
             Kind::Y4mFile(file) => file.write(planes),
-            Kind::Stdout(out) => {
+            Kind::Stdout { out, last } => {
+                *last = Some(planes.to_vec());
                 write_frame(out, planes).map_err(|error| Place::Stdout.error(cannot_write(&error)))
             }
-            Kind::Pictures(_) => Ok(()),
+            Kind::Pictures { .. } => Ok(()),
         }
     }
 
@@ -239,9 +270,19 @@ impl FrameSink {
     pub fn finish(self) -> Result<(), VideoError> {
         match self.kind {
             Kind::Y4mFile(file) => file.finish(),
-            Kind::Pictures(_) | Kind::Stdout(_) => Ok(()),
+            Kind::Pictures { .. } | Kind::Stdout { .. } => Ok(()),
         }
     }
+}
+
+/// A photograph of nothing.
+fn grey_photo(header: &Header) -> Photo {
+    let (width, height) = (header.width, header.height);
+    Photo::from_srgb8(
+        width,
+        height,
+        vec![[GREY; 3]; width as usize * height as usize],
+    )
 }
 
 /// What stands beside the frames.

@@ -236,18 +236,21 @@ fn file_error(path: &Path, message: impl Into<String>) -> VideoError {
 }
 
 fn take_picture(path: &Path) -> Taken {
-    let frame = |photo, warnings| VideoFrame {
-        photo,
-        pixels: Pixels::File(path.into()),
-        warnings,
-    };
     match Photo::read(path) {
-        Ok((photo, warnings)) => Taken::Whole(frame(photo, warnings)),
+        Ok((photo, warnings)) => Taken::Whole(VideoFrame {
+            photo,
+            pixels: Pixels::File(path.into()),
+            warnings,
+        }),
         Err(problem) => {
             let bytes = read_file(path, MAX_PICTURE_BYTES).unwrap_or_default();
             Taken::Damaged {
                 problem: file_error(path, problem),
-                rest: Photo::decode_cut(&bytes).map(|photo| frame(photo, Vec::new())),
+                rest: Photo::decode_cut(&bytes).map(|photo| VideoFrame {
+                    photo,
+                    pixels: Pixels::Decoded,
+                    warnings: Vec::new(),
+                }),
             }
         }
     }

@@ -159,6 +159,29 @@ impl Y4mFile {
         Ok(has)
     }
 
+    /// Planes of the last frame that is there.
+    pub(super) fn last(&mut self) -> Result<Option<Vec<u8>>, VideoError> {
+        let Some(part) = &mut self.part else {
+            return Ok(None);
+        };
+        let failed =
+            |error: io::Error| Place::File(self.paths.part.clone()).error(cannot_write(&error));
+        // Every frame is flushed: the file is all that there is.
+        let file = part.get_mut();
+        let end = file.stream_position().map_err(failed)?;
+        let mut planes = vec![0; self.frame_bytes as usize - MARKER.len()];
+        let Some(begin) = end
+            .checked_sub(planes.len() as u64)
+            .filter(|begin| *begin > self.line.len() as u64)
+        else {
+            return Ok(None);
+        };
+        file.seek(SeekFrom::Start(begin))
+            .and_then(|_| file.read_exact(&mut planes))
+            .map_err(failed)?;
+        Ok(Some(planes))
+    }
+
     /// Is on the disk when this ends.
     pub(super) fn write(&mut self, planes: &[u8]) -> Result<(), VideoError> {
         let Some(file) = &mut self.part else {

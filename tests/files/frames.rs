@@ -56,6 +56,33 @@ fn stamps_of_an_epoch_pair_by_time() {
     folder.refuse_sequence_of("frames", "t.txt", "no pose for 1403636579800000000.png");
 }
 
+/// Frames with time stamps may be missing, and are told.
+#[test]
+fn gaps_between_time_stamps() {
+    let poses = "0.0 0 0 -3 0 0 0 1\n0.1 0 0 -3 0 0 0 1\n0.2 0 0 -3 0 0 0 1\n";
+    for (names, gap) in [
+        (
+            ["0.000.png", "0.033.png", "0.067.png", "0.167.png"],
+            "0.1000 s between 0.067.png and 0.167.png",
+        ),
+        (
+            ["0.png", "100000000.png", "133000000.png", "167000000.png"],
+            "0.1000 s between 0.png and 100000000.png",
+        ),
+    ] {
+        let folder = folder(&names, poses);
+        let said = folder.sequence_of("frames", "t.txt", "");
+        assert!(said.contains(gap), "{said}");
+        assert_eq!(said.matches(" s between ").count(), 1, "{said}");
+        let said = folder.sequence_of("frames", "t.txt", "--allow-gaps");
+        assert!(!said.contains("are missing"), "{said}");
+    }
+    // A film's jitter is no gap.
+    let even = ["0.000.png", "0.033.png", "0.080.png", "0.100.png"];
+    let said = folder(&even, poses).sequence_of("frames", "t.txt", "");
+    assert!(!said.contains("are missing"), "control: {said}");
+}
+
 #[test]
 fn tum_from1() {
     let poses = "# t x y z q\n100.0000 0 0 -3 0 0 0 1\n100.0333 0.5 0 -3 0 0 0 1\n100.0667 -0.5 0 -3 0 0 0 1\n";
@@ -87,6 +114,37 @@ fn unpadded_numbers_are_in_order() {
         let seen = folder.ball_at(name)[0];
         assert!((seen - column(x)).abs() < 0.5, "{name}: {seen}");
     }
+}
+
+/// Numbers before something else that all names have.
+#[test]
+fn numbers_within_names_are_in_order() {
+    let poses = "0 0 0 -3 0 0 0 1\n1 0.5 0 -3 0 0 0 1\n2 -0.5 0 -3 0 0 0 1\n";
+    for names in [
+        ["9_rgb.png", "10_rgb.png", "11_rgb.png"],
+        ["shot_9_64x48.png", "shot_10_64x48.png", "shot_11_64x48.png"],
+        [
+            "rgb_1403636579.950.png",
+            "rgb_1403636579.983.png",
+            "rgb_1403636580.017.png",
+        ],
+    ] {
+        let poses = match names[0].starts_with("rgb") {
+            true => poses
+                .replace("0 0 0 -3", "1403636579.950 0 0 -3")
+                .replace("1 0.5", "1403636579.983 0.5")
+                .replace("2 -0.5", "1403636580.017 -0.5"),
+            false => poses.to_owned(),
+        };
+        let folder = folder(&names, &poses);
+        folder.sequence_of("frames", "t.txt", "");
+        for (name, x) in names.iter().zip([0.0, 0.5, -0.5]) {
+            let seen = folder.ball_at(name)[0];
+            assert!((seen - column(x)).abs() < 0.5, "{name}: {seen}");
+        }
+    }
+    let gap = folder(&["9_rgb.png", "11_rgb.png"], poses);
+    gap.refuse_sequence_of("frames", "t.txt", "frame 10 is missing");
 }
 
 #[test]

@@ -193,6 +193,89 @@ fn cv_ros_fisheye_wide() {
     folder.refuse(command, "unified");
 }
 
+/// The model of the distortion says more than that of the camera.
+#[test]
+fn pinholes_with_the_distortion_of_a_fisheye() {
+    let folder = wide_folder();
+    let x = |model: &str| {
+        folder.write(
+            "transforms.json",
+            format!(
+                r#"{{{model} "w": 64, "h": 48, "fl_x": 20.0, "fl_y": 20.0, "cx": 32.0, "cy": 24.0,
+                "frames": [{{"file_path": "images/f_0000.png", "transform_matrix": [[1,0,0,3],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}}]}}"#
+            ),
+        );
+        folder.sequence_of("frames", "transforms.json", "");
+        folder.ball_at("f_0000.png")[0]
+    };
+    for model in [
+        r#""camera_model": "PINHOLE", "distortion_model": "equidistant","#,
+        r#""distortion_model": "kannala_brandt", "camera_model": "pinhole","#,
+        r#""fisheye": "true", "camera_model": "OPENCV","#,
+        r#""lens_type": "fisheye", "camera_model": "OPENCV","#,
+    ] {
+        assert!((x(model) - EQUIDISTANT).abs() < 0.5, "{model}");
+    }
+    let radial = r#""camera_model": "PINHOLE", "distortion_model": "radtan","#;
+    assert!((x(radial) - EQUIDISTANT).abs() > 3.0, "control");
+}
+
+/// A camera chain of Kalibr, and a sensor of EuRoC.
+#[test]
+fn kalibr_camera_chains() {
+    let folder = wide_folder();
+    folder.write("t.txt", "0.0 3 0 -3 0 0 0 1\n");
+    let chain = |models: &str, rest: &str| {
+        format!("cam0:\n  cam_overlaps: []\n  {models}\n  {rest}\n  rostopic: /cam0/image_raw\n")
+    };
+    let lists = "distortion_coeffs: [0.0, 0.0, 0.0, 0.0]\n  intrinsics: [20.0, 20.0, 31.5, 23.5]\n  resolution: [64, 48]";
+    let x = |text: &str| {
+        folder.write("calib.yaml", text);
+        folder.sequence_of("frames", "t.txt", "--intrinsics calib.yaml");
+        folder.ball_at("f_0000.png")[0]
+    };
+    let equidistant = "camera_model: pinhole\n  distortion_model: equidistant";
+    assert!((x(&chain(equidistant, lists)) - EQUIDISTANT).abs() < 0.5);
+    let lines = "intrinsics:\n  - 20.0\n  - 20.0\n  - 31.5\n  - 23.5\n  distortion_coeffs:\n  - 0.1\n  - 0.0\n  - 0.0\n  - 0.0";
+    let bent = x(&chain(equidistant, lines));
+    assert!(bent < EQUIDISTANT - 0.5, "{bent}");
+    let radial = "camera_model: pinhole\n  distortion_model: radtan";
+    assert!(
+        (x(&chain(radial, lists)) - EQUIDISTANT).abs() > 3.0,
+        "control"
+    );
+    let euroc = "sensor_type: camera\nresolution: [64, 48]\ncamera_model: pinhole\nintrinsics: [20.0, 20.0, 31.5, 23.5] #fu, fv, cu, cv\n\
+         distortion_model: radial-tangential\ndistortion_coefficients: [0.0, 0.0, 0.0, 0.0]\n";
+    assert_eq!(x(euroc), x(&chain(radial, lists)));
+    let command =
+        "sequence scene.toml --frames frames --trajectory t.txt --intrinsics calib.yaml -o out";
+    let refuse = |text: &str, part: &str| {
+        folder.write("calib.yaml", text);
+        folder.refuse(command, part);
+    };
+    refuse(
+        &chain("camera_model: omni\n  distortion_model: radtan", lists),
+        "omni",
+    );
+    refuse(
+        &chain("camera_model: pinhole\n  distortion_model: fov", lists),
+        "fov",
+    );
+    refuse(
+        &chain(
+            radial,
+            &lists.replace("intrinsics: [", "intrinsics: [0.9, "),
+        ),
+        "calib.yaml:6: 5 intrinsics",
+    );
+    let two = [
+        chain(radial, lists),
+        chain(radial, lists).replace("cam0:", "cam1:"),
+    ]
+    .concat();
+    refuse(&two, "cam0, cam1");
+}
+
 /// In a scene file, and in the picture that a render writes.
 #[test]
 fn fisheyes_of_scene_files() {
@@ -212,6 +295,15 @@ fn fisheyes_of_scene_files() {
     let bent = x("lens_model = \"fisheye\"\ndistortion = [0.1, 0, 0, 0]");
     assert!(bent < EQUIDISTANT - 0.5, "{bent}");
     assert!((x("") - EQUIDISTANT).abs() > 3.0, "control");
+    let angle = (48.0_f64 / 20.0).to_degrees();
+    folder.write(
+        "scene.toml",
+        scene("lens_model = \"fisheye\"")
+            .replace("fx = 20", &format!("vertical_fov_deg = {angle}")),
+    );
+    folder.succeed("render scene.toml -o out.png");
+    let wide = centroid(&folder.open("out.png"))[0];
+    assert!((wide - EQUIDISTANT).abs() < 0.5, "{wide}");
     let open = "lens_model = \"fisheye\"\n[lens]\naperture_radius_m = 0.01\nfocus_distance_m = 3";
     folder.write("scene.toml", scene(open));
     folder.refuse("render scene.toml -o out.png", "89 degrees");

@@ -1,5 +1,7 @@
 //! Which layers an EXR file has, and what they cost.
 
+use mixray::output::ChannelFile;
+
 use super::support::ball;
 use crate::support::{Folder, stderr};
 
@@ -40,6 +42,51 @@ fn rays_in_the_real_world(folder: &Folder) -> u64 {
     let stats = folder.json("s.json");
     let count = |kind: &str| stats["rays"][kind].as_u64().expect("a count");
     count("real") + count("real_shadow")
+}
+
+/// Films of sample ranges trace no more than a picture does, and what is asked for later is made up for.
+#[test]
+fn exr_layers_of_films() {
+    let folder = folder();
+    let part = |range: &str, layers: &str| {
+        render(&folder, &format!("--range {range} {layers}"));
+        std::fs::rename(folder.path("out.exr"), folder.path(&format!("{range}.exr")))
+            .expect("renames");
+        rays_in_the_real_world(&folder)
+    };
+    let merge = |layers: &str| {
+        folder.succeed(&format!("merge 0..8.exr 8..16.exr {layers} -o merged.exr"));
+        let exr =
+            exr::meta::MetaData::read_from_file(folder.path("merged.exr"), true).expect("reads");
+        let channels = exr.headers[0].channels.list.iter();
+        let names: Vec<String> = channels.map(|channel| channel.name.to_string()).collect();
+        names
+    };
+    let bare = part("0..8", "") + part("8..16", "");
+    let (usual, of_picture) = render(&folder, "");
+    // What an edge lacks whose other side is in the other part is traced by the merge.
+    assert!(bare <= of_picture, "{bare}, {of_picture}");
+    let names = merge("");
+    for layer in &usual {
+        let starts = |name: &String| name.starts_with(&format!("{layer}."));
+        assert!(layer.is_empty() || names.iter().any(starts), "{layer}");
+    }
+    assert!(!names.iter().any(|name| name.starts_with("real.")));
+    // The same, whether the parts or the merge have traced it.
+    assert!(merge("--layers real,mixed").contains(&"real.R".to_owned()));
+    let real =
+        |path: &str| ChannelFile::read(&folder.path(path)).expect("reads").floats["real.R"].clone();
+    let of_merge = real("merged.exr");
+    let costly = part("0..8", "--layers real") + part("8..16", "--layers real");
+    assert!(bare < costly, "control: {bare}, {costly}");
+    merge("--layers real");
+    let close = |a: &[f32], b: &[f32]| {
+        a.iter()
+            .zip(b)
+            .all(|(a, b)| (a - b).abs() <= 1e-6 * a.abs())
+    };
+    assert!(close(&of_merge, &real("merged.exr")));
+    assert!(of_merge.iter().any(|x| *x > 0.0), "control");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What cannot be used is called by its name, and nothing else is said.
 
 use super::support::{FOCAL_PX, ball, ball_with_camera};
-use crate::support::{Folder, stderr, stdout};
+use crate::support::{Folder, assert_refused, stderr, stdout};
 
 #[test]
 fn kitti() {
@@ -66,6 +66,30 @@ fn lens_focus_inside_focal() {
     );
     folder.write("scene.toml", scene("0.06"));
     folder.succeed("render scene.toml -o out.png");
+    // Of each frame, and of a pull, before the first is rendered.
+    folder.grey_frames(&["f_0.png", "f_1.png"]);
+    let poses = |focus: &str| {
+        let frame = |number: u32, focus: &str| {
+            format!(
+                r#"{{"frame": {number}, "focus_distance_m": {focus}, "world_from_camera": [[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}}"#
+            )
+        };
+        let frames = [frame(0, "1"), frame(1, focus)].join(", ");
+        folder.write("t.json", format!(r#"{{"frames": [{frames}]}}"#));
+    };
+    poses("0.04");
+    folder.refuse_sequence_of(
+        "frames",
+        "t.json",
+        "t.json: frames[1]: `focus_distance_m` is 0.04",
+    );
+    assert!(!folder.path("out").exists());
+    poses("0.06");
+    folder.sequence_of("frames", "t.json", "");
+    let pull =
+        |from: &str| folder.run_sequence("frames", "t.json", &format!("--focus-pull {from}..2"));
+    assert_refused(&pull("0.04"), "--focus-pull");
+    assert_eq!(pull("0.06").status.code(), Some(0), "control");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Films: pictures that are cut off, tables that are left out, colours of high definition.
 
 use image::codecs::jpeg::JpegEncoder;
-use image::{Rgb, RgbImage};
+use image::{DynamicImage, ImageBuffer, Rgb, RgbImage};
 
 use super::support::ball_with_camera;
 use crate::support::Folder;
@@ -90,23 +90,84 @@ fn truncjpg() {
     assert_ne!(row(0, 47), row(1, 47), "control");
 }
 
-/// A PNG file keeps its bytes, and the frames about it their names.
+/// What of a PNG file is lost is grey.
 #[test]
 fn frames_that_are_cut_off_in_folders() {
     let folder = folder();
-    folder.grey_frames(&["f_0.png", "f_1.png", "f_2.png"]);
+    folder.create("frames");
+    // Noise, so that half of the bytes are half of the rows.
+    let code = |x: u32, y: u32, channel: u32| {
+        let mixed = u64::from(x * 7919 + y * 104_729 + channel * 31) * 2_654_435_761;
+        ((mixed >> 8) % 65_000) as u16
+    };
+    for number in 0..3 {
+        let picture = ImageBuffer::from_fn(64, 48, |x, y| {
+            Rgb([0, 1, 2].map(|channel| code(x, y, channel + number)))
+        });
+        let path = folder.path(&format!("frames/f_{number}.png"));
+        match number {
+            1 => picture.save(path).expect("saves"),
+            _ => DynamicImage::ImageRgb16(picture)
+                .into_rgb8()
+                .save(path)
+                .expect("saves"),
+        }
+    }
+    let wide = |name: &str| image::open(folder.path(name)).expect("opens").into_rgb16();
     let whole = folder.bytes("frames/f_1.png");
+    let first_row = wide("frames/f_1.png").into_raw()[..64 * 3].to_vec();
     folder.write("frames/f_1.png", &whole[..whole.len() / 2]);
     folder.refuse_sequence_of("frames", "t.txt", "f_1.png: it cannot be decoded");
     let said = folder.sequence_of("frames", "t.txt", "--damaged-frames pass");
     assert!(
-        said.contains("f_1.png") && said.contains("left out"),
+        said.contains("f_1.png") && said.contains("passes through"),
         "{said}"
     );
-    assert_eq!(folder.frames_of("out").len(), 2);
-    folder.write("frames/f_1.png", whole);
-    folder.sequence_of("frames", "t.txt", "--damaged-frames pass");
-    assert_eq!(folder.frames_of("out").len(), 3, "control");
+    assert_eq!(folder.frames_of("out").len(), 3);
+    let passed = wide("out/f_1.png").into_raw();
+    assert_eq!(passed[..64 * 3], first_row);
+    assert!(passed[47 * 64 * 3..].iter().all(|code| *code == 0x8080));
+    let next = wide("out/f_2.png").into_raw();
+    assert!(
+        !next[47 * 64 * 3..].iter().all(|code| *code == 0x8080),
+        "control"
+    );
+}
+
+/// Of which nothing can be decoded: their places are kept, in folders and in films.
+#[test]
+fn frames_of_which_nothing_is_left() {
+    let folder = folder();
+    folder.grey_frames(&["f_0.png", "f_1.png", "f_2.png"]);
+    let whole = folder.bytes("frames/f_0.png");
+    for (lost, word) in [("f_0.png", "grey"), ("f_2.png", "the frame before")] {
+        folder.write(&format!("frames/{lost}"), &whole[..10]);
+        let said = folder.sequence_of("frames", "t.txt", "--damaged-frames pass");
+        assert!(said.contains(&format!("{word} stands for it")), "{said}");
+        assert_eq!(folder.frames_of("out").len(), 3, "{lost}");
+        let stand_in = folder.bytes(&format!("out/{lost}"));
+        assert_eq!(stand_in == folder.bytes("out/f_1.png"), lost == "f_2.png");
+        if lost == "f_0.png" {
+            let picture = folder.open("out/f_0.png");
+            assert!(picture.pixels().all(|pixel| pixel.0 == [128; 3]));
+        }
+        folder.write(&format!("frames/{lost}"), &whole);
+    }
+    std::fs::remove_dir_all(folder.path("out")).expect("removes");
+    // A film of JPEG pictures whose first is nothing but its marker.
+    folder.write(
+        "in.mjpg",
+        [&[0xff, 0xd8], &jpeg(90)[..], &jpeg(90)].concat(),
+    );
+    folder.sequence_of("in.mjpg", "t.txt", "--damaged-frames pass");
+    assert_eq!(folder.frames_of("out").len(), 3);
+    let command = "sequence scene.toml --frames in.mjpg --trajectory t.txt -o out.y4m --overwrite --damaged-frames pass";
+    folder.succeed(command);
+    let film = folder.bytes("out.y4m");
+    let frames = film.windows(6).filter(|at| *at == b"FRAME\n").count();
+    assert_eq!(frames, 3);
+    assert_eq!(film[film.len() - 3 * (64 * 48 * 3 + 6) + 6], 128, "grey");
+    assert_ne!(film[film.len() - 64 * 48 * 3], 128, "control");
 }
 
 fn y4m(lost: Option<usize>) -> Vec<u8> {

@@ -33,6 +33,7 @@ fn lens(aperture_radius_m: f64, focus_distance_m: f64, aperture: Aperture) -> Le
         focus_distance_m,
         aperture,
         blade_rotation_deg: 20.0,
+        focal_length_m: 0.0,
     }
 }
 

@@ -84,22 +84,29 @@ pub(super) fn pick(headers: &[Header]) -> Result<Place, String> {
     let mut found = pictures(headers);
     let rank = |name: &str| {
         let last = name.rsplit('.').next().unwrap_or_default();
-        match last.to_ascii_lowercase() {
-            last if last.is_empty() => 0,
-            last if PICTURE_NAMES.contains(&last.as_str()) => 1,
-            _ => 2,
+        let is_last = |own: &&str| last.eq_ignore_ascii_case(own);
+        match last {
+            "" => 0,
+            _ => 1 + (PICTURE_NAMES.iter().position(is_last)).unwrap_or(PICTURE_NAMES.len()),
         }
     };
     found.sort_by_key(|(name, place)| (rank(name), place.part));
     match found.as_slice() {
-        [(name, place), rest @ ..] if rank(name) < 2 || rest.is_empty() => Ok(*place),
+        [(_, place)] => Ok(*place),
+        [(name, place), ..] if rank(name) == 0 => Ok(*place),
+        // Several of the same name, as of several view layers, are not told apart by it.
+        [(name, place), (next, _), ..]
+            if rank(name) <= PICTURE_NAMES.len() && rank(name) < rank(next) =>
+        {
+            Ok(*place)
+        }
         [] => grey(headers).ok_or_else(|| {
             "it has no channels R, G, B or Y; expected an RGB or grey image; convert it".to_owned()
         }),
         several => {
             let names: Vec<&str> = several.iter().map(|(name, ..)| name.as_str()).collect();
             Err(format!(
-                "it holds several pictures ({}) and none is named as the one; expected R, G and B without a layer, or one of {}; name it, or say which after the file's name (a.exr#layer)",
+                "it holds several pictures ({}) and no single one is named as such; expected R, G and B without a layer, or one of {}; name it, or say which after the file's name (a.exr#layer)",
                 names.join(", "),
                 PICTURE_NAMES.join(", ")
             ))

@@ -65,6 +65,9 @@ fn the_part_that_is_named_as_the_picture_is_taken() {
         assert_eq!(of(["albedo", name]).map(|red| red[0]), Ok(0.0), "{name}");
         assert_eq!(of([name, "albedo"]).map(|red| red[0]), Ok(100.0), "{name}");
     }
+    let two = of(["A.Combined", "B.Combined"]).expect_err("none is the one");
+    assert!(two.contains("(A.Combined, B.Combined)"), "{two}");
+    assert_eq!(of(["color", "rgba"]).map(|red| red[0]), Ok(0.0));
     let refused = of(["albedo", "diffuse"]).expect_err("none is the picture");
     assert!(refused.contains("(albedo, diffuse)"), "{refused}");
 }
@@ -74,6 +77,15 @@ fn layers_by_prefix_are_taken_as_parts_are() {
     let combined = ["A.Combined.R", "A.Combined.G", "A.Combined.B"];
     let bytes = file(vec![layer(None, combined, 7.0)], window());
     assert_eq!(red(&bytes).map(|red| red[..2].to_vec()), Ok(vec![7.0, 8.0]));
+    for names in [
+        ["beauty.r", "beauty.g", "beauty.b"],
+        ["Red", "Green", "Blue"],
+    ] {
+        let albedo = ["albedo.R", "albedo.G", "albedo.B"];
+        let layers = vec![layer(Some("a"), albedo, 90.0), layer(Some("b"), names, 7.0)];
+        let red = red(&file(layers, window())).map(|red| red[0]);
+        assert_eq!(red, Ok(7.0), "{names:?}");
+    }
     let halves = ["A.Combined.R", "A.Combined.G", "X.B"];
     let bytes = file(vec![layer(None, halves, 7.0)], window());
     assert!(red(&bytes).is_err(), "control: no layer is whole");
@@ -92,6 +104,10 @@ fn a_data_window_is_placed_in_the_display_window() {
         "{:?}",
         image.warnings
     );
+    let mut beside = layer(None, RGB, 1.0);
+    beside.attributes.layer_position = Vec2(9, 2);
+    let refused = decode_image(&file(vec![beside], display)).expect_err("nothing is seen");
+    assert!(refused.contains("lies outside"), "{refused}");
     let red = red(&bytes).expect("decodes");
     let sample = |x: usize, y: usize| red[y * 8 + x];
     assert_eq!(sample(2, 1), 1.0, "its first pixel");

@@ -14,7 +14,7 @@ content! {
     Photo { width, height, linear; encoded, tags }
     Distortion { model, coefficients }
     Camera { width, height, fx, fy, cx, cy, distortion, world_from_camera }
-    Lens { aperture_radius_m, focus_distance_m, aperture, blade_rotation_deg }
+    Lens { aperture_radius_m, focus_distance_m, aperture, blade_rotation_deg; focal_length_m }
     Shutter { exposure_secs, readout_secs, samples, time_secs }
 
     Environment { map, rotation_deg, scale }

@@ -25,7 +25,8 @@ fn the_shortest_scene_has_the_stated_defaults() {
             aperture_radius_m: 0.0,
             focus_distance_m: f64::INFINITY,
             aperture: Aperture::Disc,
-            blade_rotation_deg: 0.0
+            blade_rotation_deg: 0.0,
+            focal_length_m: 0.0
         }
     );
     assert_eq!(

@@ -1,6 +1,7 @@
 //! Which frame is which: one rule for the files of a folder, the frames of a stream, and the names in a trajectory.
 //!
-//! The names of a folder are told apart together: all are time stamps, or all end in numbers, or they have their order alone.
+//! The names of a folder are told apart together: all are time stamps, or all end in numbers, or all differ in one number alone, or they
+//! have their order alone.
 
 /// A frame as its source names it.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,7 +10,7 @@ pub struct FrameName {
     pub label: String,
     /// The file's path, `/` between folders; `None` in a stream.
     pub file: Option<String>,
-    /// The number at the end of the file's name; the place where names are time stamps or have no number, and in a stream.
+    /// The number in the file's name; the place where names are time stamps or have no number, and in a stream.
     pub number: u32,
     /// From 0, among all frames of the source in their order.
     pub place: u32,
@@ -37,6 +38,8 @@ pub enum Naming {
     Stamps(f64),
     /// A number stands at the end of each.
     Numbers,
+    /// They differ in this one of their numbers, from 0, and have nothing else but it in common.
+    Inner(usize),
     /// Their order is all that they tell.
     Order,
 }
@@ -52,7 +55,8 @@ impl Naming {
     /// Of these file names.
     pub fn of<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Self {
         let stems = names.map(|name| stem(file_name(name)));
-        if stems.clone().all(is_fraction) {
+        let is_epoch = |stem| trailing_fraction(stem).is_some_and(|t| EPOCH_SECS.contains(&t));
+        if stems.clone().all(is_fraction) || stems.clone().all(is_epoch) {
             return Self::Stamps(1.0);
         }
         let Some(mut numbers) = stems
@@ -60,7 +64,7 @@ impl Naming {
             .map(trailing_digits)
             .collect::<Option<Vec<u64>>>()
         else {
-            return Self::Order;
+            return Self::inner(stems);
         };
         let units = [1e9, 1e6, 1e3];
         let of_epoch = |unit: &f64| {
@@ -77,8 +81,35 @@ impl Naming {
         match least.filter(|least| are_whole && *least >= LEAST_STEP) {
             Some(LEAST_STEP_NS..) => Self::Stamps(1e9),
             Some(_) => Self::Stamps(1e6),
+            // They end alike, as with a size.
+            None if least == Some(0) && Self::inner(stems.clone()) != Self::Order => {
+                Self::inner(stems)
+            }
             None if numbers.last().is_some_and(|n| u32::try_from(*n).is_ok()) => Self::Numbers,
             None => Self::Order,
+        }
+    }
+
+    fn inner<'a>(mut stems: impl Iterator<Item = &'a str> + Clone) -> Self {
+        let Some(first) = stems.next() else {
+            return Self::Order;
+        };
+        let rest: Vec<&str> = stems.collect();
+        let between = |stem: &'a str| {
+            stem.split(|c: char| c.is_ascii_digit())
+                .filter(|part| !part.is_empty())
+        };
+        if !rest.iter().all(|stem| between(stem).eq(between(first))) {
+            return Self::Order;
+        }
+        let differs = |(place, run): &(usize, &str)| {
+            rest.iter()
+                .any(|stem| digit_runs(stem).nth(*place) != Some(run))
+        };
+        let mut different = digit_runs(first).enumerate().filter(differs);
+        match (different.next(), different.next()) {
+            (Some((place, _)), None) => Self::Inner(place),
+            _ => Self::Order,
         }
     }
 
@@ -90,13 +121,15 @@ impl Naming {
         let stem = stem(file_name(name));
         match is_fraction(stem) {
             true => stem.parse().ok(),
+            false if unit == 1.0 => trailing_fraction(stem),
             false => Some(trailing_digits(stem)? as f64 / unit),
         }
     }
 
-    /// The number at the end of a name.
+    /// The number in a name.
     pub fn number(self, name: &str) -> Option<u32> {
         match self {
+            Self::Inner(place) => digit_runs(stem(file_name(name))).nth(place)?.parse().ok(),
             Self::Numbers => u32::try_from(trailing_digits(stem(file_name(name)))?).ok(),
             Self::Stamps(_) | Self::Order => None,
         }
@@ -130,6 +163,18 @@ pub(super) fn stem(file: &str) -> &str {
 fn is_fraction(stem: &str) -> bool {
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     (stem.split_once('.')).is_some_and(|(whole, fraction)| digits(whole) && digits(fraction))
+}
+
+/// Seconds with a fraction at the end of a name.
+fn trailing_fraction(stem: &str) -> Option<f64> {
+    let before = stem.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
+    let number = &stem[before.len()..];
+    is_fraction(number).then(|| number.parse().ok())?
+}
+
+fn digit_runs(stem: &str) -> impl Iterator<Item = &str> {
+    let runs = stem.split(|c: char| !c.is_ascii_digit());
+    runs.filter(|run| !run.is_empty())
 }
 
 fn trailing_digits(stem: &str) -> Option<u64> {
@@ -171,6 +216,24 @@ mod tests {
         );
         assert_eq!(naming(&["IMG_20260101123456.jpg"]), Naming::Order, "a date");
         assert_eq!(naming(&["a.png", "b.png"]), Naming::Order);
+        assert_eq!(naming(&["9_rgb.png", "10_rgb.png"]), Naming::Inner(0));
+        assert_eq!(
+            naming(&["cam2 (1)-64x48.png", "cam2 (10)-64x48.png"]),
+            Naming::Inner(1)
+        );
+        assert_eq!(
+            naming(&["1_a2.png", "2_a1.png", "3_a1.png"]),
+            Naming::Numbers,
+            "two numbers differ"
+        );
+        assert_eq!(
+            naming(&["1_a.png", "2_b.png"]),
+            Naming::Order,
+            "of two kinds"
+        );
+        let epoch = ["rgb_1403636579.963.png", "rgb_1403636580.013.png"];
+        assert_eq!(naming(&epoch), Naming::Stamps(1.0));
+        assert_eq!(naming(&epoch).time_secs(epoch[1]), Some(1_403_636_580.013));
     }
 
     #[test]

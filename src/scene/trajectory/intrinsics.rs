@@ -1,11 +1,15 @@
 //! Intrinsics, gathered field by field: what a frame says comes first, then what its file says of all frames, then a field of view.
 
+use std::borrow::Cow;
+
 use glam::DMat4;
 
 use crate::distortion::{Distortion, LENS_FISHEYE};
 use crate::refusal::Refusal;
 use crate::scene::Camera;
 use crate::scene::projection::check_distortion;
+
+use super::numbers;
 
 /// Pinhole intrinsics with OpenCV distortion, as [`Camera`] has them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +81,7 @@ impl Intrinsics {
 }
 
 /// Of half a field of view, how far from the centre it ends where the focal length is 1.
-fn half_view(angle: f64, is_fisheye: bool) -> f64 {
+pub(crate) fn half_view(angle: f64, is_fisheye: bool) -> f64 {
     match is_fisheye {
         true => angle,
         false => angle.tan(),
@@ -89,8 +93,16 @@ pub(super) const COEFFICIENTS: [&str; 12] = [
     "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4",
 ];
 
-/// The lens models of OpenCV under all of their names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Where files name the model of their lens: what is not known there is refused.
+const MODEL_KEYS: [&str; 4] = [
+    "distortion_model",
+    "camera_model",
+    "lens_model",
+    "camera_type",
+];
+
+/// The lens models of OpenCV under all of their names, from the least to the most special.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum LensModel {
     /// k1 k2 p1 p2 k3.
     Radial,
@@ -101,7 +113,7 @@ pub(super) enum LensModel {
 }
 
 impl LensModel {
-    const NAMES: [(&str, Self); 21] = [
+    const NAMES: [(&str, Self); 25] = [
         ("OPENCV", Self::Radial),
         ("PINHOLE", Self::Radial),
         ("SIMPLE_PINHOLE", Self::Radial),
@@ -121,6 +133,10 @@ impl LensModel {
         ("OPENCV_FISHEYE", Self::Fisheye),
         ("FISHEYE", Self::Fisheye),
         ("EQUIDISTANT", Self::Fisheye),
+        ("EQUI", Self::Fisheye),
+        ("KANNALA_BRANDT", Self::Fisheye),
+        ("KANNALA_BRANDT4", Self::Fisheye),
+        ("KB4", Self::Fisheye),
         ("RADIAL_FISHEYE", Self::Fisheye),
         ("SIMPLE_RADIAL_FISHEYE", Self::Fisheye),
     ];
@@ -137,6 +153,33 @@ impl LensModel {
                 "the camera model {name} is not known; expected OpenCV's pinhole (OPENCV, FULL_OPENCV) or fisheye (OPENCV_FISHEYE); undistort the frames"
             )
         })
+    }
+
+    /// Of all that a file says, keys with their values: a fisheye by any word, and a pinhole's distortion, which says more than its camera.
+    pub(super) fn of<'a>(
+        said: impl Iterator<Item = (&'a str, Cow<'a, str>)>,
+    ) -> Result<Option<Self>, String> {
+        let mut found = None;
+        for (key, value) in said {
+            let key = key.to_ascii_lowercase();
+            let is_true = || ["1", "1.0", "true", "yes"].contains(&&*value.to_ascii_lowercase());
+            let model = if MODEL_KEYS.contains(&key.as_str()) {
+                Some(Self::named(&value)?)
+            } else if key.contains("fisheye") && is_true() {
+                Some(Self::Fisheye)
+            } else if ["model", "type", "projection"]
+                .iter()
+                .any(|word| key.contains(word))
+            {
+                Self::named(&value)
+                    .ok()
+                    .filter(|model| *model == Self::Fisheye)
+            } else {
+                None
+            };
+            found = found.max(model);
+        }
+        Ok(found)
     }
 
     /// The lens of these coefficients, absent ones 0.
@@ -284,6 +327,40 @@ impl Fields {
             distortion: model.lens(&self.coefficients)?,
         })
     }
+}
+
+/// Of fx, fy, cx, cy that count from the first pixel's centre, and OpenCV's coefficients in order: twelve at most, a fisheye's k1 to k4.
+pub(super) fn intrinsics_of_pixel_centres(
+    [fx, fy, cx, cy]: [f64; 4],
+    size: Option<(u32, u32)>,
+    model: Option<LensModel>,
+    words: &[&str],
+) -> Result<Intrinsics, String> {
+    let mut coefficients = [None; 12];
+    for (index, word) in words.iter().enumerate() {
+        let [k] = numbers::<1>(&[word], "distortion coefficients")?;
+        let place = match (model, index) {
+            (Some(LensModel::Fisheye), 2 | 3) => index + 2,
+            _ => index,
+        };
+        match coefficients.get_mut(place) {
+            Some(coefficient) => *coefficient = Some(k),
+            None if k == 0.0 => {}
+            None => {
+                return Err(format!(
+                    "coefficient {} is {k}; expected OpenCV's twelve up to the thin prism; calibrate without a tilted sensor",
+                    index + 1
+                ));
+            }
+        }
+    }
+    let model = model.unwrap_or(LensModel::Rational);
+    Ok(Intrinsics {
+        size,
+        focal: Focal::Pixels([fx, fy]),
+        centre: Some([cx + 0.5, cy + 0.5]),
+        distortion: model.lens(&coefficients).map_err(|why| why.to_string())?,
+    })
 }
 
 fn lacks(names: &str) -> Unusable {

@@ -1,5 +1,7 @@
 //! Intrinsics as the JSON of several programs has them.
 
+use std::borrow::Cow;
+
 use serde_json::{Map, Value};
 
 use super::Intrinsics;
@@ -18,9 +20,6 @@ pub(super) enum Style {
     /// Tracked videos count pixel centres from 0, as OpenCV does.
     Tracked,
 }
-
-const MODEL_KEYS: &[&str] = &["camera_model", "distortion_model", "lens_model"];
-const FISHEYE_KEYS: &[&str] = &["is_fisheye", "fisheye", "fisheye_model"];
 
 /// The style of a file that is made of these tables.
 pub(super) fn style_of<'a>(tables: impl Iterator<Item = &'a Object> + Clone) -> Problem<Style> {
@@ -132,17 +131,16 @@ fn coefficients(table: &Object, is_fisheye: bool) -> Problem<[Option<f64>; 12]> 
 
 /// Wherever the table says it: by a name, or that it is a fisheye.
 fn model_of(table: &Object) -> Problem<Option<LensModel>> {
-    let is_fisheye = |key: &&str| {
-        let value = table.get(*key);
-        value.and_then(Value::as_bool) == Some(true) || value.and_then(Value::as_f64) == Some(1.0)
-    };
-    if FISHEYE_KEYS.iter().any(is_fisheye) {
-        return Ok(Some(LensModel::Fisheye));
-    }
-    let nested = table
-        .get("distortion")
-        .and_then(|distortion| distortion.get("model"));
-    let named = MODEL_KEYS.iter().filter_map(|key| table.get(*key));
-    let mut names = named.chain(nested).filter_map(Value::as_str);
-    names.next().map(LensModel::named).transpose()
+    let nested = table.get("distortion").and_then(Value::as_object);
+    let nested = nested.and_then(|distortion| distortion.get("model"));
+    let nested = nested.map(|model| ("distortion_model", model));
+    let all = table
+        .iter()
+        .map(|(key, value)| (key.as_str(), value))
+        .chain(nested);
+    LensModel::of(all.filter_map(|(key, value)| match value {
+        Value::String(text) => Some((key, Cow::from(text))),
+        Value::Bool(_) | Value::Number(_) => Some((key, Cow::from(value.to_string()))),
+        _ => None,
+    }))
 }

@@ -11,6 +11,7 @@ mod intrinsics;
 mod json;
 mod json_intrinsics;
 mod json_values;
+mod kalibr;
 mod kitti;
 mod opencv;
 mod path;
@@ -22,6 +23,7 @@ mod tum;
 
 pub use camera_file::{CameraFile, PixelOrigin, read_camera};
 pub use frame_name::{FrameName, Naming};
+pub(crate) use intrinsics::half_view;
 pub use intrinsics::{Focal, Intrinsics};
 pub use opencv::read_intrinsics;
 pub use path::CameraPath;

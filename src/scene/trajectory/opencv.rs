@@ -1,11 +1,12 @@
-//! Intrinsics that OpenCV's calibration writes: YAML with `camera_matrix`, `distortion_coefficients`, `image_width` and `image_height`.
+//! Intrinsics that OpenCV's and ROS's calibrations write: YAML with `camera_matrix`, `distortion_coefficients`, `image_width` and `image_height`.
 //!
 //! OpenCV's dialect is no valid YAML (its first line), so the few keys are found by hand.
 
+use std::borrow::Cow;
 use std::path::Path;
 
-use super::intrinsics::LensModel;
-use super::{Focal, Intrinsics, Result, file_error, line_error, numbers, read_text};
+use super::intrinsics::{LensModel, intrinsics_of_pixel_centres};
+use super::{Intrinsics, Result, file_error, kalibr, line_error, numbers, read_text};
 
 const MATRIX_KEYS: &[&str] = &["camera_matrix", "cameraMatrix", "Camera_Matrix"];
 const DISTORTION_KEYS: &[&str] = &[
@@ -14,7 +15,7 @@ const DISTORTION_KEYS: &[&str] = &[
     "Distortion_Coefficients",
 ];
 
-/// Reads an OpenCV calibration. Its principal point counts from the first pixel's centre; half a pixel is added.
+/// Reads a calibration of OpenCV, ROS or Kalibr. Its principal point counts from the first pixel's centre; half a pixel is added.
 ///
 /// # Errors
 /// A matrix that is missing, short, NaN, or of another camera model.
@@ -28,7 +29,13 @@ pub fn read_intrinsics(path: &Path) -> Result<Intrinsics> {
             ),
         )
     };
-    let (line, words) = matrix(&text, MATRIX_KEYS).ok_or_else(|| lacks(MATRIX_KEYS[0]))?;
+    let model = model_of(&text).map_err(|problem| file_error(path, problem))?;
+    let Some((line, words)) = matrix(&text, MATRIX_KEYS) else {
+        return match kalibr::is_kalibr(&text) {
+            true => kalibr::read(path, &text, model),
+            false => Err(lacks(MATRIX_KEYS[0])),
+        };
+    };
     let at_line = |problem| line_error(path, line, problem);
     let [fx, skew, cx, _, fy, cy, _, _, one] =
         numbers::<9>(&slices(&words), "the camera matrix").map_err(at_line)?;
@@ -37,64 +44,24 @@ pub fn read_intrinsics(path: &Path) -> Result<Intrinsics> {
             "the camera matrix is not fx 0 cx, 0 fy cy, 0 0 1; expected focal lengths above 0 and no skew; correct it".to_owned(),
         ));
     }
-    let model = model_of(&text).map_err(|problem| file_error(path, problem))?;
-    let mut coefficients = [None; 12];
-    if let Some((line, words)) = matrix(&text, DISTORTION_KEYS) {
-        let words = slices(&words);
-        let at_line = |problem| line_error(path, line, problem);
-        for (index, word) in words.iter().enumerate() {
-            let [k] = numbers::<1>(&[word], "distortion coefficients").map_err(at_line)?;
-            // A fisheye's four are k1 to k4.
-            let place = match (model, index) {
-                (Some(LensModel::Fisheye), 2 | 3) => index + 2,
-                _ => index,
-            };
-            match coefficients.get_mut(place) {
-                Some(coefficient) => *coefficient = Some(k),
-                None if k == 0.0 => {}
-                None => {
-                    return Err(at_line(format!(
-                        "coefficient {} is {k}; expected OpenCV's twelve up to the thin prism; calibrate without a tilted sensor",
-                        index + 1
-                    )));
-                }
-            }
-        }
-    }
-    let model = model.unwrap_or(LensModel::Rational);
-    let distortion = model
-        .lens(&coefficients)
-        .map_err(|why| file_error(path, why.to_string()))?;
+    let (line, words) = matrix(&text, DISTORTION_KEYS).unwrap_or((line, Vec::new()));
     let side = |key: &str| {
         let value = text
             .lines()
             .find_map(|line| line.trim().strip_prefix(key)?.strip_prefix(':'));
         value.and_then(|value| value.trim().parse::<u32>().ok())
     };
-    Ok(Intrinsics {
-        size: side("image_width").zip(side("image_height")),
-        focal: Focal::Pixels([fx, fy]),
-        centre: Some([cx + 0.5, cy + 0.5]),
-        distortion,
-    })
+    let size = side("image_width").zip(side("image_height"));
+    intrinsics_of_pixel_centres([fx, fy, cx, cy], size, model, &slices(&words))
+        .map_err(|problem| line_error(path, line, problem))
 }
 
 /// Where the file says it: by name, or that it is a fisheye.
 fn model_of(text: &str) -> std::result::Result<Option<LensModel>, String> {
-    let value = |key: &str| {
-        let value = text
-            .lines()
-            .find_map(|line| line.trim().strip_prefix(key)?.strip_prefix(':'))?;
-        Some(value.trim().trim_matches(['"', '\'']))
-    };
-    let is_fisheye = value("fisheye_model").or(value("is_fisheye"));
-    if is_fisheye.is_some_and(|yes| ["1", "true"].contains(&yes)) {
-        return Ok(Some(LensModel::Fisheye));
-    }
-    let named = ["distortion_model", "camera_model"]
-        .into_iter()
-        .find_map(value);
-    named.map(LensModel::named).transpose()
+    LensModel::of(text.lines().filter_map(|line| {
+        let (key, value) = line.split('#').next()?.trim().split_once(':')?;
+        Some((key, Cow::from(value.trim().trim_matches(['"', '\'']))))
+    }))
 }
 
 fn slices(words: &[String]) -> Vec<&str> {
