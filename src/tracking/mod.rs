@@ -21,6 +21,7 @@ mod homography;
 mod lattice;
 mod layout;
 mod learning;
+mod least_squares;
 mod lens;
 mod light;
 mod line;
