@@ -28,6 +28,8 @@ mod terminal;
 mod threads;
 #[cfg(feature = "track")]
 mod track;
+#[cfg(feature = "track")]
+mod track_values;
 mod values;
 
 use std::ffi::OsString;

@@ -42,7 +42,7 @@ pub fn render_sequence(
     watcher: &Watcher<'_>,
     hear: &dyn Fn(&Event<'_>),
 ) -> Result<RenderedSequence, SequenceError> {
-    let files = Files::read(options)?;
+    let files = Files::read(options, hear)?;
     let frames = options.frames.as_deref().ok_or_else(|| {
         SequenceError::Unfit(
             "--frames is absent; expected a folder of pictures, a .y4m file, or -; add it"
@@ -54,7 +54,7 @@ pub fn render_sequence(
         source.set_matrix(matrix);
     }
     let rate = known_rate(options, &files.trajectory, Some(&source));
-    let views = views(&files.trajectory, rate, source.is_stream())?;
+    let views = views(options, &files.trajectory, rate, source.is_stream())?;
     check_frames(options, &source, &views, hear)?;
     let names: Option<Vec<FrameName>> = source.names().map(|names| {
         names

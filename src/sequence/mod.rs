@@ -20,12 +20,14 @@ mod check;
 mod driver;
 mod plan;
 mod report;
+mod scale;
 
 use std::path::PathBuf;
 
 pub use check::{Reprojection, check_poses};
 pub use driver::{RenderedSequence, render_sequence};
 pub use report::{FrameCounts, SequenceSeconds, SequenceStats};
+pub use scale::{ScaleFrom, Sighting, read_clicks};
 
 use crate::output::{OutputError, PngBits};
 use crate::renderer::{Filter, Goal, RenderError, Without};
@@ -52,6 +54,10 @@ pub struct SequenceOptions {
     pub trajectory: PathBuf,
     /// OpenCV calibration in place of the intrinsics of trajectory and scene.
     pub intrinsics: Option<PathBuf>,
+    /// A known distance, where the poses know no metres.
+    pub scale_from: Option<ScaleFrom>,
+    /// Frames without an entry among the poses pass through; else they are errors.
+    pub pass_missing_poses: bool,
     /// Folder for PNG files, .y4m file, or `-` for Y4M on standard output.
     pub output: PathBuf,
     /// Numbers of the frames to render, the end not included.
@@ -91,6 +97,8 @@ impl SequenceOptions {
             frames: Some(frames.into()),
             trajectory: trajectory.into(),
             intrinsics: None,
+            scale_from: None,
+            pass_missing_poses: false,
             output: output.into(),
             range: None,
             allow_gaps: false,
