@@ -12,6 +12,8 @@ mod goal_flags;
 mod info;
 mod interrupt;
 mod layers;
+#[cfg(feature = "track")]
+mod live;
 mod merge;
 mod motion_blur;
 mod noise;
@@ -57,6 +59,8 @@ enum Command {
     Sequence(sequence::Arguments),
     #[cfg(feature = "track")]
     Track(Box<track::Arguments>),
+    #[cfg(feature = "track")]
+    Live(Box<live::Arguments>),
     Merge(merge::Arguments),
     #[cfg(feature = "bench")]
     Bench(Box<bench::Arguments>),
@@ -121,6 +125,8 @@ fn run_command() -> ExitCode {
         Command::Sequence(arguments) => sequence::run(&arguments),
         #[cfg(feature = "track")]
         Command::Track(arguments) => track::run(&arguments),
+        #[cfg(feature = "track")]
+        Command::Live(arguments) => live::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
         #[cfg(feature = "bench")]
         Command::Bench(arguments) => bench::run(*arguments),
