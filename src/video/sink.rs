@@ -61,7 +61,8 @@ impl FrameSink {
         let kind = if plan.path == Path::new("-") {
             let mut out = BufWriter::new(std::io::stdout());
             let header = format!("{}\n", plan.header.line);
-            let sent = out.write_all(header.as_bytes());
+            // Who reads a running stream need not wait for its first frame.
+            let sent = out.write_all(header.as_bytes()).and_then(|()| out.flush());
             sent.map_err(|error| Place::Stdout.error(cannot_write(&error)))?;
             Kind::Stdout(out)
         } else if plan.path.extension().is_some_and(|e| e == "y4m") {
