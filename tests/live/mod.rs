@@ -175,7 +175,7 @@ fn streams_that_break_off_change_or_are_noise_end_with_an_error() {
     let smaller = String::from_utf8_lossy(header).replace("W480", "W240");
     let change = [header, frames[0], smaller.as_bytes(), frames[1]].concat();
     refused(&change, "expected frames of one size");
-    refused(b"no stream", "YUV4MPEG2");
+    refused(b"no stream\n", "YUV4MPEG2");
     let mut random = Random(5);
     let mut noise = [header, b"FRAME\n"].concat();
     noise.extend((0..480 * 360 * 3 / 2).map(|_| random.bits() as u8));
