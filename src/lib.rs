@@ -67,6 +67,9 @@ pub mod film;
 pub mod gpu;
 #[doc(hidden)]
 pub mod light;
+#[cfg(feature = "track")]
+#[doc(hidden)]
+pub mod live;
 #[doc(hidden)]
 pub mod material;
 #[doc(hidden)]

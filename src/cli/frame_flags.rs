@@ -1,15 +1,15 @@
 //! What `sequence` and `submit` both take: which frames, and how they are read.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
 use super::Failure;
 use super::picture_flags::PictureFlags;
-use super::values::whole_range;
+use super::values::{length, whole_range};
 use crate::output::{ExrLayer, Format};
 use crate::scene::Overrides;
-use crate::sequence::SequenceOptions;
+use crate::sequence::{ScaleFrom, SequenceOptions, Sighting, read_clicks};
 use crate::video::Matrix;
 
 #[derive(Debug, Args)]
@@ -35,6 +35,15 @@ pub(super) struct FrameFlags {
     /// Frames of which a part is lost: end with an error, or name them and let what is there of them pass
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = Damaged::Refuse)]
     damaged_frames: Damaged,
+    /// Frames that the trajectory does not have: end with an error, or let them pass through
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = Missing::Refuse)]
+    missing_poses: Missing,
+    /// Two points and the distance between them, where the poses know no metres: ids of markers in the frames, or points of --clicks
+    #[arg(long, value_name = "A,B,0.30m", value_parser = scale_from)]
+    scale_from: Option<([String; 2], f64)>,
+    /// Where the points of --scale-from were seen (CSV: point,frame,x_px,y_px), two frames or more each
+    #[arg(long, value_name = "CLICKS.csv", requires = "scale_from")]
+    clicks: Option<PathBuf>,
     /// Y'CbCr of films [default: 709 from 720 lines on, else 601]
     #[arg(long, value_name = "MATRIX", value_parser = matrix)]
     matrix: Option<Matrix>,
@@ -48,6 +57,12 @@ pub(super) struct FrameFlags {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Damaged {
+    Refuse,
+    Pass,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Missing {
     Refuse,
     Pass,
 }
@@ -75,6 +90,8 @@ impl FrameFlags {
             frames: self.frames.clone(),
             trajectory,
             intrinsics: self.intrinsics.clone(),
+            scale_from: self.scale()?,
+            pass_missing_poses: self.missing_poses == Missing::Pass,
             output,
             format: self.format,
             layers: self.layers.clone(),
@@ -90,6 +107,54 @@ impl FrameFlags {
             sandbox: flags.scene.sandbox,
         })
     }
+
+    fn scale(&self) -> Result<Option<ScaleFrom>, Failure> {
+        let Some((ends, metres)) = self.scale_from.clone() else {
+            return Ok(None);
+        };
+        let sightings = match &self.clicks {
+            Some(path) => read_clicks(path)?,
+            None => marker_sightings(self.frames.as_deref(), &ends)?,
+        };
+        Ok(Some(ScaleFrom {
+            ends,
+            metres,
+            sightings,
+        }))
+    }
+}
+
+/// Middles of the markers with these ids.
+#[cfg(feature = "track")]
+fn marker_sightings(frames: Option<&Path>, ends: &[String; 2]) -> Result<Vec<Sighting>, Failure> {
+    let frames = frames.filter(|path| *path != Path::new("-"));
+    let frames = frames.ok_or_else(|| {
+        Failure("--scale-from by markers: it needs the frames twice; expected a folder or a file as --frames; name it, or give --clicks".to_owned())
+    })?;
+    let ids = ends.clone().map(|end| end.parse::<u32>());
+    let [Ok(a), Ok(b)] = ids else {
+        return Err(Failure(format!(
+            "--scale-from {},{}: no ids of markers; expected two numbers, or --clicks CLICKS.csv that has these points; correct them",
+            ends[0], ends[1]
+        )));
+    };
+    Ok(crate::tracking::sight_markers(frames, [a, b])?)
+}
+
+#[cfg(not(feature = "track"))]
+fn marker_sightings(_: Option<&Path>, _: &[String; 2]) -> Result<Vec<Sighting>, Failure> {
+    Err(Failure("--scale-from: this program was built without markers; expected --clicks CLICKS.csv; give it".to_owned()))
+}
+
+/// "3,7,0.30m".
+fn scale_from(text: &str) -> Result<([String; 2], f64), &'static str> {
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    match parts.as_slice() {
+        [a, b, far] if a != b && !a.is_empty() && !b.is_empty() => {
+            length(far).map(|metres| ([(*a).to_owned(), (*b).to_owned()], metres))
+        }
+        _ => Err("expected two different points and their distance, such as 3,7,0.30m"),
+    }
 }
 
 fn format(text: &str) -> Result<Format, &'static str> {
@@ -100,7 +165,7 @@ fn format(text: &str) -> Result<Format, &'static str> {
     }
 }
 
-fn matrix(text: &str) -> Result<Matrix, &'static str> {
+pub(super) fn matrix(text: &str) -> Result<Matrix, &'static str> {
     match text {
         "601" => Ok(Matrix::Bt601),
         "709" => Ok(Matrix::Bt709),

@@ -18,6 +18,8 @@ mod goal_flags;
 mod info;
 mod interrupt;
 mod layers;
+#[cfg(feature = "track")]
+mod live;
 mod merge;
 mod motion_blur;
 #[cfg(feature = "start")]
@@ -40,6 +42,8 @@ mod terminal;
 mod threads;
 #[cfg(feature = "track")]
 mod track;
+#[cfg(feature = "track")]
+mod track_values;
 mod values;
 
 use std::ffi::OsString;
@@ -74,6 +78,8 @@ enum Command {
     Track(Box<track::Arguments>),
     #[cfg(feature = "start")]
     New(Box<new::Arguments>),
+    #[cfg(feature = "track")]
+    Live(Box<live::Arguments>),
     Merge(merge::Arguments),
     Submit(Box<submit::Arguments>),
     Bundle(bundle::Arguments),
@@ -153,6 +159,8 @@ fn run_command() -> ExitCode {
         Command::Track(arguments) => track::run(&arguments),
         #[cfg(feature = "start")]
         Command::New(arguments) => new::run(&arguments),
+        #[cfg(feature = "track")]
+        Command::Live(arguments) => live::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),
         Command::Submit(arguments) => {
             let typed = matches.subcommand_matches("submit").unwrap_or(&matches);

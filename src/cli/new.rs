@@ -7,7 +7,7 @@ use clap::{Args, Parser};
 use glam::DVec2;
 
 use super::terminal::print;
-use super::track::length;
+use super::values::length;
 use super::{Failure, Outcome, render};
 use crate::files;
 use crate::output::{Format, PngBits, Target, write_bytes, write_image, write_text};

@@ -7,12 +7,12 @@ use clap::Args;
 use super::progress::Steps;
 use super::terminal::summarize;
 use super::threads::ThreadsFlag;
+use super::track_values::{Chosen, Gamma, family, flatness, gamma};
+use super::values::length;
 use super::{Failure, Outcome};
 use crate::output::{check_writable_as, write_text};
 use crate::scene::trajectory::{Focal, read_intrinsics};
-use crate::tracking::{
-    Family, Flatness, Lens, Target, Tone, TrackOptions, family_named, read_board, track,
-};
+use crate::tracking::{Flatness, Lens, Target, TrackOptions, read_board, track};
 
 /// Finds the camera's pose in every frame from markers or a chessboard
 ///
@@ -47,6 +47,9 @@ pub(super) struct Arguments {
     /// How far the board's surface may bend out of its plane, or "rigid"
     #[arg(long, value_name = "LENGTH", default_value = "2mm", value_parser = flatness)]
     board_flatness: Flatness,
+    /// Smooths the poses by what their covariances leave open, and says how far they were moved
+    #[arg(long)]
+    smooth: bool,
     /// Poses for `mixray sequence` (.json); the calibration goes to the same name with .yaml
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -68,14 +71,6 @@ pub(super) struct Arguments {
     #[command(flatten)]
     threads: ThreadsFlag,
 }
-
-/// `None`: whichever is found.
-#[derive(Clone, Copy, Debug)]
-struct Chosen(Option<&'static Family>);
-
-/// `None`: estimated.
-#[derive(Clone, Copy, Debug)]
-struct Gamma(Option<Tone>);
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     arguments.threads.start()?;
@@ -114,7 +109,10 @@ fn run_on(video: &Path, arguments: &Arguments) -> Result<(), Failure> {
         steps.say(&format!("{frames} frames looked at"));
     });
     steps.clear();
-    let session = tracked?;
+    let mut session = tracked?;
+    if arguments.smooth {
+        session.smooth();
+    }
     write_text(
         &arguments.output,
         &serde_json::to_string(&session.trajectory())?,
@@ -175,57 +173,5 @@ impl Arguments {
             centre: [cx, cy].into(),
             distortion: intrinsics.distortion,
         }))
-    }
-}
-
-fn family(name: &str) -> Result<Chosen, String> {
-    match name {
-        "auto" => Ok(Chosen(None)),
-        _ => family_named(name).map(|family| Chosen(Some(family))),
-    }
-}
-
-fn gamma(text: &str) -> Result<Gamma, &'static str> {
-    match (text, text.parse::<f64>()) {
-        ("auto", _) => Ok(Gamma(None)),
-        ("srgb", _) => Ok(Gamma(Some(Tone::Srgb))),
-        (_, Ok(power)) if (0.5..=4.0).contains(&power) => Ok(Gamma(Some(Tone::Power(power)))),
-        _ => Err("expected auto, srgb, or a power from 0.5 to 4"),
-    }
-}
-
-fn flatness(text: &str) -> Result<Flatness, &'static str> {
-    match text {
-        "rigid" => Ok(Flatness::RIGID),
-        _ => length(text)
-            .map(Flatness::of_paper)
-            .map_err(|_| "expected a length such as 2mm, or rigid"),
-    }
-}
-
-/// Metres of "40mm", "4cm", "0.04m" or "1.5in".
-pub(super) fn length(text: &str) -> Result<f64, &'static str> {
-    let units = [("mm", 1e-3), ("cm", 1e-2), ("in", 0.0254), ("m", 1.0)];
-    let parsed = units.into_iter().find_map(|(unit, metres)| {
-        let number = text.strip_suffix(unit)?.trim().parse::<f64>().ok()?;
-        (number > 0.0 && number < 1e6).then_some(number * metres)
-    });
-    parsed.ok_or("expected a length with its unit, such as 40mm, 4cm, 0.04m or 1.5in")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lengths_need_their_unit() {
-        assert!((length("40mm").unwrap() - 0.04).abs() < 1e-12);
-        assert!((length("1.5in").unwrap() - 0.0381).abs() < 1e-12);
-        assert!((length("0.2m").unwrap() - 0.2).abs() < 1e-12);
-        for wrong in ["40", "mm", "-4mm", "4 feet", "nanm"] {
-            assert!(length(wrong).is_err(), "{wrong}");
-        }
-        assert!(flatness("rigid").unwrap().is_rigid() && !flatness("2mm").unwrap().is_rigid());
-        assert!(gamma("9").is_err() && gamma("1.4").is_ok() && family("hiro").is_err());
     }
 }

@@ -91,6 +91,16 @@ pub(super) fn camera_noise(text: &str) -> Result<CameraNoise, Failure> {
     }
 }
 
+/// Metres of "40mm", "4cm", "0.04m" or "1.5in".
+pub(super) fn length(text: &str) -> Result<f64, &'static str> {
+    let units = [("mm", 1e-3), ("cm", 1e-2), ("in", 0.0254), ("m", 1.0)];
+    let parsed = units.into_iter().find_map(|(unit, metres)| {
+        let number = text.strip_suffix(unit)?.trim().parse::<f64>().ok()?;
+        (number > 0.0 && number < 1e6).then_some(number * metres)
+    });
+    parsed.ok_or("expected a length with its unit, such as 40mm, 4cm, 0.04m or 1.5in")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -53,7 +53,7 @@ pub fn check_poses(
     points: Option<&Path>,
     hear: &dyn Fn(&Event<'_>),
 ) -> Result<Reprojection, SequenceError> {
-    let files = Files::read(options)?;
+    let files = Files::read(options, hear)?;
     let points = match points {
         Some(path) => read_points(path)?,
         None => files.trajectory.known_points.clone(),
@@ -71,12 +71,12 @@ pub fn check_poses(
         .transpose()?;
     let is_stream = source.as_ref().is_some_and(FrameSource::is_stream);
     let rate = known_rate(options, &files.trajectory, source.as_ref());
-    let views = views(&files.trajectory, rate, is_stream)?;
+    let views = views(options, &files.trajectory, rate, is_stream)?;
     let mut errors: BTreeMap<String, Errors> = BTreeMap::new();
     let (mut used, mut without_pose, mut behind) = (0u64, 0u64, 0u64);
     let mut own_camera: Option<(Camera, Lens)> = None;
     for point in &points {
-        let name = frame_of(&point.key);
+        let name = FrameName::of_key(&point.key);
         let view = views.of(&name)?;
         let Some(pose) = view.world_from_camera else {
             without_pose += 1;
@@ -174,22 +174,6 @@ fn table(errors: &BTreeMap<String, Errors>, used: u64, without_pose: u64, behind
         let _ = writeln!(text, "{name}: rms {rms:.3} px");
     }
     text
-}
-
-fn frame_of(key: &EntryKey) -> FrameName {
-    let (label, file, number) = match key {
-        EntryKey::Number(number) | EntryKey::Order(number) => {
-            (format!("frame {number}"), None, *number)
-        }
-        EntryKey::Name(name) => (name.clone(), Some(name.clone()), 0),
-    };
-    FrameName {
-        label,
-        file,
-        number,
-        place: number,
-        time_secs: None,
-    }
 }
 
 /// `frame,x_px,y_px,x_m,y_m,z_m` a line; `frame` is a number or a file name, the pixel may be empty.

@@ -43,7 +43,7 @@ pub fn render_sequence(
     hear: &dyn Fn(&Event<'_>),
 ) -> Result<RenderedSequence, SequenceError> {
     let output = output_of(options)?;
-    let files = Files::read(options)?;
+    let files = Files::read(options, hear)?;
     let mut source = open_source(options)?;
     let whole = Whole::new(options, output, &files, &source, hear)?;
     hear(&Event::Plan {

@@ -20,6 +20,7 @@ mod check;
 mod driver;
 mod plan;
 mod report;
+mod scale;
 mod survey;
 mod whole;
 
@@ -28,6 +29,7 @@ use std::path::PathBuf;
 pub use check::{Reprojection, check_poses};
 pub use driver::{RenderedSequence, render_sequence};
 pub use report::{FrameCounts, SequenceSeconds, SequenceStats};
+pub use scale::{ScaleFrom, Sighting, read_clicks};
 pub use survey::{Survey, survey};
 
 use crate::output::{ExrLayer, Format, OutputError, PngBits};
@@ -55,6 +57,10 @@ pub struct SequenceOptions {
     pub trajectory: PathBuf,
     /// OpenCV calibration in place of the intrinsics of trajectory and scene.
     pub intrinsics: Option<PathBuf>,
+    /// A known distance, where the poses know no metres.
+    pub scale_from: Option<ScaleFrom>,
+    /// Frames without an entry among the poses pass through; else they are errors.
+    pub pass_missing_poses: bool,
     /// Folder for pictures, pattern of their names (`out.####.exr`), .y4m file, or `-` for Y4M on standard output.
     pub output: PathBuf,
     /// Of pictures in a folder; PNG where it is not given.
@@ -100,6 +106,8 @@ impl SequenceOptions {
             frames: Some(frames.into()),
             trajectory: trajectory.into(),
             intrinsics: None,
+            scale_from: None,
+            pass_missing_poses: false,
             output: output.into(),
             format: None,
             layers: Vec::new(),

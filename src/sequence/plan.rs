@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::scale::measure;
 use super::{Event, SequenceError, SequenceOptions};
 use crate::check::{self, Extent};
 use crate::scene::trajectory::{
@@ -19,12 +20,35 @@ pub(super) struct Files {
 }
 
 impl Files {
-    pub(super) fn read(options: &SequenceOptions) -> Result<Self, SequenceError> {
+    pub(super) fn read(
+        options: &SequenceOptions,
+        hear: &dyn Fn(&Event<'_>),
+    ) -> Result<Self, SequenceError> {
         let path = options.intrinsics.as_deref();
-        Ok(Self {
+        let mut files = Self {
             trajectory: Trajectory::read(&options.trajectory)?,
             intrinsics: path.map(read_intrinsics).transpose()?,
-        })
+        };
+        let trajectory = &files.trajectory;
+        let model = trajectory.path.parent();
+        if options.trajectory.is_dir() && model != Some(&options.trajectory) {
+            hear(&Event::Note(format!(
+                "the largest model counts: {}, {} pictures",
+                model.unwrap_or(&options.trajectory).display(),
+                trajectory.entries.len()
+            )));
+        }
+        if let Some(known) = &options.scale_from {
+            let views = views(options, trajectory, None, false)?;
+            let scale = measure(&views, &|view| files.intrinsics_of(view), known)?;
+            hear(&Event::Note(format!(
+                "lengths of the poses are multiplied by {:.5}; lines of sight pass the points by {:.3} degrees",
+                scale.factor,
+                scale.off_radians.to_degrees()
+            )));
+            files.trajectory.scale(scale.factor);
+        }
+        Ok(files)
     }
 
     /// `None`: the scene file's.
@@ -71,15 +95,15 @@ pub(super) fn known_rate(
 }
 
 pub(super) fn views<'a>(
+    options: &SequenceOptions,
     trajectory: &'a Trajectory,
     rate: Option<f64>,
     is_stream: bool,
 ) -> Result<Views<'a>, SequenceError> {
-    Ok(Views::new(
-        trajectory,
-        Some(rate.unwrap_or(ANY_RATE)),
-        is_stream,
-    )?)
+    Ok(
+        Views::new(trajectory, Some(rate.unwrap_or(ANY_RATE)), is_stream)?
+            .passing_missing(options.pass_missing_poses),
+    )
 }
 
 /// The scene depends on time, so that the rate has to be known.
@@ -142,8 +166,16 @@ pub(super) fn check_frames(
             names.len()
         )));
     }
+    let mut has_pose = false;
     for name in wanted {
-        views.of(name)?;
+        has_pose |= views.of(name)?.world_from_camera.is_some();
+    }
+    if options.pass_missing_poses && !has_pose {
+        return Err(SequenceError::Unfit(format!(
+            "{}: it has a pose for none of the frames in {}; expected one at least; look whether their names are the same",
+            options.trajectory.display(),
+            frames.display()
+        )));
     }
     Ok(())
 }

@@ -31,7 +31,7 @@ pub fn survey(
     hear: &dyn Fn(&Event<'_>),
 ) -> Result<Survey, SequenceError> {
     let output = output_of(options)?;
-    let files = Files::read(options)?;
+    let files = Files::read(options, hear)?;
     let mut source = open_source(options)?;
     let whole = Whole::new(options, output, &files, &source, hear)?;
     let frames = match source.is_stream() {

@@ -60,7 +60,7 @@ impl<'a> Whole<'a> {
         hear: &dyn Fn(&Event<'_>),
     ) -> Result<Self, SequenceError> {
         let rate = known_rate(options, &files.trajectory, Some(source));
-        let views = views(&files.trajectory, rate, source.is_stream())?;
+        let views = views(options, &files.trajectory, rate, source.is_stream())?;
         check_frames(options, source, &views, hear)?;
         let names: Option<Vec<FrameName>> = source.names().map(|names| {
             names

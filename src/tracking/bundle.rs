@@ -5,6 +5,7 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Dyn, Matrix6, OMatrix, U6, Vector6};
 
 use super::frame_pose::{Observation, project, robust};
+use super::least_squares::{Descending, Descent};
 use super::lens::{LENS_PARAMETERS, Lens};
 use super::pose::Pose;
 
@@ -118,8 +119,8 @@ pub struct Solution {
     pub covariance: DMatrix<f64>,
 }
 
-/// Poses of a frame, eliminated.
-struct Block {
+/// A frame's pose, to be eliminated.
+pub struct Block {
     information: Matrix6<f64>,
     slope: Vector6<f64>,
     /// Shared parameters that the frame depends on.
@@ -134,20 +135,6 @@ impl Problem<'_> {
         shared
     }
 
-    fn cost(&self) -> f64 {
-        let variance = self.noise_px * self.noise_px;
-        let shared = self.shared();
-        let priors: f64 = self.priors.iter().map(|p| p.error(&shared).0.powi(2)).sum();
-        let views = self.views.iter().flat_map(|view| {
-            view.observations.iter().map(|o| {
-                project(&self.lens, &view.pose, self.points[o.point], o.pixel)
-                    .map_or(1e4, |p| robust(p.error.length_squared() / variance).0)
-            })
-        });
-        let known = if self.has_shared() { priors } else { 0.0 };
-        known + views.sum::<f64>()
-    }
-
     fn has_shared(&self) -> bool {
         self.free_points || self.free_lens.contains(&true)
     }
@@ -157,34 +144,6 @@ impl Problem<'_> {
             Some(is_free) => *is_free,
             None => self.free_points,
         }
-    }
-
-    /// Blocks of the frames, and the shared system before they are eliminated.
-    fn linearised(&self) -> (Vec<Block>, DMatrix<f64>, DVector<f64>) {
-        let size = LENS_PARAMETERS + 3 * self.points.len();
-        let mut information = DMatrix::zeros(size, size);
-        let mut slope = DVector::zeros(size);
-        let mut blocks = Vec::with_capacity(self.views.len());
-        for view in &self.views {
-            blocks.push(self.block(view, &mut information, &mut slope));
-        }
-        let shared = self.shared();
-        for prior in self.priors {
-            let (error, slopes) = prior.error(&shared);
-            for (i, by_i) in &slopes {
-                slope[*i] -= error * by_i;
-                for (j, by_j) in &slopes {
-                    information[(*i, *j)] += by_i * by_j;
-                }
-            }
-        }
-        for fixed in (0..size).filter(|parameter| !self.is_free(*parameter)) {
-            information.row_mut(fixed).fill(0.0);
-            information.column_mut(fixed).fill(0.0);
-            information[(fixed, fixed)] = 1.0;
-            slope[fixed] = 0.0;
-        }
-        (blocks, information, slope)
     }
 
     fn block(
@@ -226,7 +185,11 @@ impl Problem<'_> {
                     let mut mixed = block.mixed.column_mut(at);
                     mixed.axpy(weight * by_k, &by_pose, 1.0);
                     for (l, by_l) in own.iter().enumerate() {
-                        shared[(global, block.columns[column(l)])] += weight * by_k * by_l;
+                        // The lower half, as in `eliminate`.
+                        let other = block.columns[column(l)];
+                        if global >= other {
+                            shared[(global, other)] += weight * by_k * by_l;
+                        }
                     }
                 }
             }
@@ -234,12 +197,117 @@ impl Problem<'_> {
         block
     }
 
-    /// One step of all; `None`: the system is singular.
+    /// Absolute errors along both axes, ascending.
+    fn sorted_errors(&self) -> Vec<f64> {
+        let all = self.views.iter().flat_map(|view| {
+            let project =
+                |o: &Observation| project(&self.lens, &view.pose, self.points[o.point], o.pixel);
+            view.observations
+                .iter()
+                .filter_map(project)
+                .flat_map(|p| p.error.abs().to_array())
+        });
+        let mut errors: Vec<f64> = all.collect();
+        errors.sort_by(f64::total_cmp);
+        errors
+    }
+
+    /// Levenberg's and Marquardt's method, the noise estimated anew between rounds; `None`: the frames do not determine what is asked.
+    pub fn solve(mut self) -> Option<Solution> {
+        const ROUNDS: usize = 5;
+        for _ in 0..ROUNDS {
+            (self, _) = DESCENT.from(self);
+            let errors = self.sorted_errors();
+            let before = self.noise_px;
+            // 1.4826 medians are a standard deviation; corners are never better than a thousandth of a pixel.
+            self.noise_px = (1.4826 * errors.get(errors.len() / 2)?).max(1e-3);
+            if (self.noise_px / before - 1.0).abs() < 0.02 {
+                break;
+            }
+        }
+        let covariance = self.covariance()?;
+        let errors = self.sorted_errors();
+        let squares: f64 = errors.iter().map(|e| e * e).sum();
+        Some(Solution {
+            rms_px: (2.0 * squares / errors.len() as f64).sqrt(),
+            views: self.views,
+            lens: self.lens,
+            points: self.points,
+            noise_px: self.noise_px,
+            covariance,
+        })
+    }
+
+    fn covariance(&self) -> Option<DMatrix<f64>> {
+        let (blocks, mut reduced, _) = self.linearised();
+        for block in &blocks {
+            let mixed = block.factor(0.0)?.solve(&block.mixed);
+            block.eliminate(&mixed, &mut reduced);
+        }
+        let mut covariance = reduced.cholesky()?.inverse();
+        for fixed in (0..covariance.nrows()).filter(|k| !self.is_free(*k)) {
+            covariance[(fixed, fixed)] = 0.0;
+        }
+        Some(covariance)
+    }
+}
+
+const DESCENT: Descent = Descent {
+    steps: 60,
+    first_damping: 1e-4,
+    least_damping: 1e-13,
+    most_damping: 1e6,
+    least_gain: 1e-9,
+};
+
+impl Descending for Problem<'_> {
+    type Linearised = (Vec<Block>, DMatrix<f64>, DVector<f64>);
+
+    fn cost(&self) -> f64 {
+        let variance = self.noise_px * self.noise_px;
+        let shared = self.shared();
+        let priors: f64 = self.priors.iter().map(|p| p.error(&shared).0.powi(2)).sum();
+        let views = self.views.iter().flat_map(|view| {
+            view.observations.iter().map(|o| {
+                project(&self.lens, &view.pose, self.points[o.point], o.pixel)
+                    .map_or(1e4, |p| robust(p.error.length_squared() / variance).0)
+            })
+        });
+        let known = if self.has_shared() { priors } else { 0.0 };
+        known + views.sum::<f64>()
+    }
+
+    /// Blocks of the frames, and the shared system before they are eliminated.
+    fn linearised(&self) -> Self::Linearised {
+        let size = LENS_PARAMETERS + 3 * self.points.len();
+        let mut information = DMatrix::zeros(size, size);
+        let mut slope = DVector::zeros(size);
+        let mut blocks = Vec::with_capacity(self.views.len());
+        for view in &self.views {
+            blocks.push(self.block(view, &mut information, &mut slope));
+        }
+        let shared = self.shared();
+        for prior in self.priors {
+            let (error, slopes) = prior.error(&shared);
+            for (i, by_i) in &slopes {
+                slope[*i] -= error * by_i;
+                for (j, by_j) in &slopes {
+                    information[(*i, *j)] += by_i * by_j;
+                }
+            }
+        }
+        for fixed in (0..size).filter(|parameter| !self.is_free(*parameter)) {
+            information.row_mut(fixed).fill(0.0);
+            information.column_mut(fixed).fill(0.0);
+            information[(fixed, fixed)] = 1.0;
+            slope[fixed] = 0.0;
+        }
+        (blocks, information, slope)
+    }
+
     fn stepped(
         &self,
-        blocks: &[Block],
-        information: &DMatrix<f64>,
-        slope: &DVector<f64>,
+        (blocks, information, slope): &Self::Linearised,
         damping: f64,
     ) -> Option<Self> {
         let mut reduced = information.clone();
@@ -286,90 +354,6 @@ impl Problem<'_> {
         }
         Some(next)
     }
-
-    /// Absolute errors along both axes, ascending.
-    fn sorted_errors(&self) -> Vec<f64> {
-        let all = self.views.iter().flat_map(|view| {
-            let project =
-                |o: &Observation| project(&self.lens, &view.pose, self.points[o.point], o.pixel);
-            view.observations
-                .iter()
-                .filter_map(project)
-                .flat_map(|p| p.error.abs().to_array())
-        });
-        let mut errors: Vec<f64> = all.collect();
-        errors.sort_by(f64::total_cmp);
-        errors
-    }
-
-    /// Levenberg's and Marquardt's method, the noise estimated anew between rounds; `None`: the frames do not determine what is asked.
-    pub fn solve(mut self) -> Option<Solution> {
-        const ROUNDS: usize = 5;
-        const STEPS: usize = 60;
-        for _ in 0..ROUNDS {
-            self = self.descended(STEPS);
-            let errors = self.sorted_errors();
-            let before = self.noise_px;
-            // 1.4826 medians are a standard deviation; corners are never better than a thousandth of a pixel.
-            self.noise_px = (1.4826 * errors.get(errors.len() / 2)?).max(1e-3);
-            if (self.noise_px / before - 1.0).abs() < 0.02 {
-                break;
-            }
-        }
-        let covariance = self.covariance()?;
-        let errors = self.sorted_errors();
-        let squares: f64 = errors.iter().map(|e| e * e).sum();
-        Some(Solution {
-            rms_px: (2.0 * squares / errors.len() as f64).sqrt(),
-            views: self.views,
-            lens: self.lens,
-            points: self.points,
-            noise_px: self.noise_px,
-            covariance,
-        })
-    }
-
-    fn descended(mut self, steps: usize) -> Self {
-        let mut cost = self.cost();
-        let mut damping = 1e-4;
-        for _ in 0..steps {
-            let (blocks, information, slope) = self.linearised();
-            let done = loop {
-                let trial = self.stepped(&blocks, &information, &slope, damping);
-                let trial_cost = trial.as_ref().map_or(f64::INFINITY, Self::cost);
-                if let Some(trial) = trial
-                    && trial_cost < cost
-                {
-                    let is_done = cost - trial_cost < 1e-9 * cost;
-                    self = trial;
-                    cost = trial_cost;
-                    damping = (damping * 0.1_f64).max(1e-13);
-                    break is_done;
-                }
-                damping *= 10.0;
-                if damping > 1e6 {
-                    break true;
-                }
-            };
-            if done {
-                break;
-            }
-        }
-        self
-    }
-
-    fn covariance(&self) -> Option<DMatrix<f64>> {
-        let (blocks, mut reduced, _) = self.linearised();
-        for block in &blocks {
-            let mixed = block.factor(0.0)?.solve(&block.mixed);
-            block.eliminate(&mixed, &mut reduced);
-        }
-        let mut covariance = reduced.cholesky()?.inverse();
-        for fixed in (0..covariance.nrows()).filter(|k| !self.is_free(*k)) {
-            covariance[(fixed, fixed)] = 0.0;
-        }
-        Some(covariance)
-    }
 }
 
 impl Block {
@@ -383,10 +367,13 @@ impl Block {
 
     /// Takes the pose out of the shared system; `mixed`: its information's inverse times the mixed block.
     fn eliminate(&self, mixed: &OMatrix<f64, U6, Dyn>, reduced: &mut DMatrix<f64>) {
-        let product = self.mixed.tr_mul(mixed);
+        // The lower half: all that a Cholesky factor reads.
         for (l, column) in self.columns.iter().enumerate() {
+            let solved = mixed.column(l);
             for (k, row) in self.columns.iter().enumerate() {
-                reduced[(*row, *column)] -= product[(k, l)];
+                if row >= column {
+                    reduced[(*row, *column)] -= self.mixed.column(k).dot(&solved);
+                }
             }
         }
     }

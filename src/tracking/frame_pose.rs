@@ -4,6 +4,7 @@ use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{Matrix3, Matrix6, Vector6};
 
 use super::homography;
+use super::least_squares::{Descending, Descent};
 use super::lens::Lens;
 use super::pose::{Pose, turn};
 
@@ -87,7 +88,68 @@ pub fn project(lens: &Lens, pose: &Pose, point: DVec3, pixel: DVec2) -> Option<P
 /// What an observation behind the camera costs.
 const BEHIND: f64 = 1e6;
 
-/// The minimum next to `start`, by Levenberg's and Marquardt's method.
+/// A pose being fitted to what is seen from it.
+struct Fitting<'a> {
+    lens: &'a Lens,
+    points: &'a [DVec3],
+    observations: &'a [Observation],
+    noise_px: f64,
+    pose: Pose,
+}
+
+const DESCENT: Descent = Descent {
+    steps: 40,
+    first_damping: 1e-3,
+    least_damping: 1e-12,
+    most_damping: 1e8,
+    least_gain: 1e-10,
+};
+
+impl Descending for Fitting<'_> {
+    type Linearised = (Matrix6<f64>, Vector6<f64>);
+
+    fn cost(&self) -> f64 {
+        let each = self.observations.iter().map(|o| {
+            project(self.lens, &self.pose, self.points[o.point], o.pixel).map_or(BEHIND, |p| {
+                robust(p.error.length_squared() / (self.noise_px * self.noise_px)).0
+            })
+        });
+        each.sum()
+    }
+
+    /// Weighted squares of the slopes, and the step's right side.
+    fn linearised(&self) -> Self::Linearised {
+        let mut information = Matrix6::zeros();
+        let mut slope = Vector6::zeros();
+        for o in self.observations {
+            let Some(p) = project(self.lens, &self.pose, self.points[o.point], o.pixel) else {
+                continue;
+            };
+            let variance = self.noise_px * self.noise_px;
+            let weight = robust(p.error.length_squared() / variance).1 / variance;
+            for (row, error) in p.by_pose.iter().zip(p.error.to_array()) {
+                let row = Vector6::from_column_slice(row);
+                information += weight * row * row.transpose();
+                slope -= weight * error * row;
+            }
+        }
+        (information, slope)
+    }
+
+    fn stepped(&self, (information, slope): &Self::Linearised, damping: f64) -> Option<Self> {
+        let mut damped = *information;
+        for k in 0..6 {
+            damped[(k, k)] *= 1.0 + damping;
+        }
+        let step = damped.cholesky()?.solve(slope);
+        Some(Self {
+            pose: self.pose.moved(step.into()),
+            ..*self
+        })
+    }
+}
+
+/// The minimum next to `start`.
 pub fn fit(
     lens: &Lens,
     points: &[DVec3],
@@ -95,76 +157,19 @@ pub fn fit(
     start: &Pose,
     noise_px: f64,
 ) -> Option<Fit> {
-    let cost_of = |pose: &Pose| -> f64 {
-        let each = observations.iter().map(|o| {
-            project(lens, pose, points[o.point], o.pixel).map_or(BEHIND, |p| {
-                robust(p.error.length_squared() / (noise_px * noise_px)).0
-            })
-        });
-        each.sum()
-    };
-    let mut pose = *start;
-    let mut cost = cost_of(&pose);
-    let mut damping = 1e-3;
-    for _ in 0..40 {
-        let (information, slope) = normal(lens, points, observations, &pose, noise_px);
-        let done = loop {
-            let mut damped = information;
-            for k in 0..6 {
-                damped[(k, k)] *= 1.0 + damping;
-            }
-            let step = damped.cholesky().map(|c| c.solve(&slope));
-            let trial = step.map(|step| pose.moved(step.into()));
-            let trial_cost = trial.as_ref().map_or(f64::INFINITY, &cost_of);
-            if let Some(trial) = trial
-                && trial_cost < cost
-            {
-                let is_done = cost - trial_cost < 1e-10 * cost;
-                pose = trial;
-                cost = trial_cost;
-                damping = (damping * 0.1).max(1e-12);
-                break is_done;
-            }
-            damping *= 10.0;
-            if damping > 1e8 {
-                break true;
-            }
-        };
-        if done {
-            break;
-        }
-    }
-    let (information, _) = normal(lens, points, observations, &pose, noise_px);
+    let (fitted, cost) = DESCENT.from(Fitting {
+        lens,
+        points,
+        observations,
+        noise_px,
+        pose: *start,
+    });
+    let (information, _) = fitted.linearised();
     cost.is_finite().then_some(Fit {
-        pose,
+        pose: fitted.pose,
         cost,
         information,
     })
-}
-
-/// Weighted squares of the slopes, and the step's right side.
-fn normal(
-    lens: &Lens,
-    points: &[DVec3],
-    observations: &[Observation],
-    pose: &Pose,
-    noise_px: f64,
-) -> (Matrix6<f64>, Vector6<f64>) {
-    let mut information = Matrix6::zeros();
-    let mut slope = Vector6::zeros();
-    for observation in observations {
-        let Some(p) = project(lens, pose, points[observation.point], observation.pixel) else {
-            continue;
-        };
-        let variance = noise_px * noise_px;
-        let weight = robust(p.error.length_squared() / variance).1 / variance;
-        for (row, error) in p.by_pose.iter().zip(p.error.to_array()) {
-            let row = Vector6::from_column_slice(row);
-            information += weight * row * row.transpose();
-            slope -= weight * error * row;
-        }
-    }
-    (information, slope)
 }
 
 /// Both minima over all observations. `groups` are ranges of observations that lie in planes of their own: each marker.

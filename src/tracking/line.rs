@@ -34,13 +34,16 @@ impl Line {
         const ROUNDS: usize = 4;
         let mut weights = vec![1.0; points.len()];
         let mut line = Self::weighted(points, &weights);
-        let mut sorted = Vec::with_capacity(points.len());
+        let mut distances = Vec::with_capacity(points.len());
         for _ in 0..ROUNDS {
-            sorted.clear();
-            sorted.extend(points.iter().map(|p| line.distance(*p)));
-            sorted.sort_by(f64::total_cmp);
-            let median = sorted.get(sorted.len() / 2).copied().unwrap_or_default();
-            let most = sorted.last().copied().unwrap_or_default();
+            distances.clear();
+            distances.extend(points.iter().map(|p| line.distance(*p)));
+            let most = distances.iter().copied().fold(0.0, f64::max);
+            let middle = distances.len() / 2;
+            let median = match distances.is_empty() {
+                true => 0.0,
+                false => *distances.select_nth_unstable_by(middle, f64::total_cmp).1,
+            };
             // 1.48 medians are a standard deviation.
             let limit = (1.5 * 1.48 * median).max(1e-3 * most).max(1e-12);
             for (w, p) in weights.iter_mut().zip(points) {

@@ -46,12 +46,28 @@ impl Pose {
         DMat4::from_mat3_translation(inverse.rotation * flip, inverse.translation)
     }
 
+    pub fn way_to(&self, other: &Self) -> Moved {
+        let centre = |pose: &Self| pose.inverse().translation;
+        Moved {
+            metres: centre(self).distance(centre(other)),
+            radians: self.angle_to(other),
+        }
+    }
+
     /// Radians between the rotations of both.
     pub fn angle_to(&self, other: &Self) -> f64 {
         let between = self.rotation.transpose() * other.rotation;
         let cosine = 0.5 * (between.x_axis.x + between.y_axis.y + between.z_axis.z - 1.0);
         cosine.clamp(-1.0, 1.0).acos()
     }
+}
+
+/// How far two poses are apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moved {
+    /// Between the camera's centres.
+    pub metres: f64,
+    pub radians: f64,
 }
 
 /// Of a rotation vector, radians.

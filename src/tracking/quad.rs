@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::light::LightImage;
 use super::line::Line;
-use super::outline::{area, dark_outlines};
+use super::outline::{Sums, area, dark_outlines};
 
 /// Corners, clockwise in the picture; pixels, corner origin.
 pub type Quad = [DVec2; 4];
@@ -21,8 +21,9 @@ const SAME_PX: f64 = 4.0;
 /// Dark quadrilaterals to about a pixel.
 pub fn find_quads(image: &LightImage) -> Vec<Quad> {
     let mut quads: Vec<Quad> = Vec::new();
+    let sums = Sums::of(image);
     for radius in RADII {
-        for outline in dark_outlines(image, radius) {
+        for outline in dark_outlines(image, &sums, radius) {
             if let Some(quad) = quad_of(&outline)
                 && !quads.iter().any(|other| is_same(other, &quad))
             {

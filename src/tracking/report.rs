@@ -16,19 +16,21 @@ const COVARIANCE_NOTE: &str = "of camera from world: turn about the camera's axe
 impl Session {
     /// The trajectory as JSON of this program: camera and frames, null where a frame has no pose.
     pub fn trajectory(&self) -> Value {
-        let frames = self
-            .names
-            .iter()
-            .zip(&self.tracked.frames)
-            .map(|(name, frame)| {
+        let frames = self.names.iter().zip(&self.tracked.frames).enumerate().map(
+            |(index, (name, frame))| {
                 let mut entry = Map::new();
                 entry.insert("frame".to_owned(), json!(name.number));
+                if let Some(Some(moved)) = self.moved.get(index) {
+                    entry.insert("smoothed_by_m".to_owned(), json!(moved.metres));
+                    entry.insert("smoothed_by_rad".to_owned(), json!(moved.radians));
+                }
                 if let Some(time) = name.time_secs {
                     entry.insert("time_secs".to_owned(), json!(time));
                 }
                 describe(frame, &mut entry);
                 Value::Object(entry)
-            });
+            },
+        );
         let mut root = Map::new();
         if let Some(rate) = self.frames_per_second {
             root.insert("frames_per_second".to_owned(), json!(rate));
@@ -136,6 +138,12 @@ impl Session {
                     BoardKind::Found { .. } => "found",
                     BoardKind::Chessboard { .. } => "chessboard",
                 },
+                "chessboard": match tracked.board.kind {
+                    BoardKind::Chessboard { columns, rows, square_m } => {
+                        json!({ "columns": columns, "rows": rows, "square_m": square_m })
+                    }
+                    _ => Value::Null,
+                },
                 "first_point_of_marker": tracked.board.markers,
                 "points_m": solution.points.iter().map(|p| p.to_array()).collect::<Vec<_>>(),
             },
@@ -177,6 +185,7 @@ impl Session {
             solution.noise_px,
             tracked.tone
         ));
+        lines.extend(self.moved_text());
         let mut reasons = std::collections::BTreeMap::<&str, usize>::new();
         for why in tracked
             .frames
@@ -191,6 +200,31 @@ impl Session {
                 .map(|(why, count)| format!("no pose: {count} frames: {why}")),
         );
         lines.join("\n") + "\n"
+    }
+}
+
+impl Session {
+    /// What was smoothed, in one line.
+    fn moved_text(&self) -> Option<String> {
+        let moved = self.moved.iter().zip(&self.names);
+        let mut moved: Vec<(f64, f64, u32)> = moved
+            .filter_map(|(moved, name)| {
+                let moved = moved.as_ref()?;
+                let (mm, degrees) = (1e3 * moved.metres, moved.radians.to_degrees());
+                Some((mm, degrees, name.number))
+            })
+            .collect();
+        moved.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (middle, most) = (moved.get(moved.len() / 2)?, moved.last()?);
+        Some(format!(
+            "smooth:  {} poses moved, by {:.3} mm and {:.4} degrees in the middle, by {:.3} mm and {:.4} degrees at most (frame {}); covariances are those before",
+            moved.len(),
+            middle.0,
+            middle.1,
+            most.0,
+            moved.iter().map(|moved| moved.1).fold(0.0, f64::max),
+            most.2
+        ))
     }
 }
 

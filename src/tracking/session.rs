@@ -10,6 +10,7 @@ use super::half_turn::keep_turn;
 use super::learning::learn_from;
 use super::light::Luma;
 use super::options::TrackOptions;
+use super::pose::Moved;
 use super::prepare::prepare;
 use super::tracker::{Tracked, pose_all};
 use crate::scene::trajectory::FrameName;
@@ -27,6 +28,8 @@ pub struct Session {
     /// One for each of the frames.
     pub names: Vec<FrameName>,
     pub frames_per_second: Option<f64>,
+    /// How far [`Session::smooth`] moved each pose; empty: nothing was smoothed.
+    pub moved: Vec<Option<Moved>>,
 }
 
 enum Picture {
@@ -109,6 +112,7 @@ pub fn track(
         tracked,
         names,
         frames_per_second,
+        moved: Vec::new(),
     })
 }
 

@@ -54,7 +54,8 @@ pub struct Tracked {
 }
 
 /// Root mean square error in pixels beyond which a frame's pose is none.
-const WORST_RMS_PX: f64 = 3.0;
+pub const WORST_RMS_PX: f64 = 3.0;
+
 /// The pose of every frame.
 pub fn pose_all(frames: &[FrameSeen], board: &Board, solution: &Solution) -> Vec<TrackedFrame> {
     let each: Vec<(Sighting, Vec<u32>, Result<Minima, String>)> = frames
@@ -82,7 +83,8 @@ pub fn pose_all(frames: &[FrameSeen], board: &Board, solution: &Solution) -> Vec
     .collect()
 }
 
-fn minima_of(
+/// Both poses that fit what a frame shows.
+pub fn minima_of(
     frame: &FrameSeen,
     sighting: &Sighting,
     solution: &Solution,
@@ -131,7 +133,8 @@ fn finished(
     })
 }
 
-fn rms_px(fit: &Fit, sighting: &Sighting, solution: &Solution) -> f64 {
+/// Root mean square of the errors' lengths, pixels.
+pub fn rms_px(fit: &Fit, sighting: &Sighting, solution: &Solution) -> f64 {
     let squares = sighting.observations.iter().map(|o| {
         let point = solution.points[o.point];
         project(&solution.lens, &fit.pose, point, o.pixel).map_or(1e6, |p| p.error.length_squared())

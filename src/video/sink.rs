@@ -79,7 +79,8 @@ impl FrameSink {
             FrameOutput::Stdout => {
                 let mut out = BufWriter::new(std::io::stdout());
                 let header = format!("{}\n", plan.header.line);
-                let sent = out.write_all(header.as_bytes());
+                // Who reads a running stream need not wait for its first frame.
+                let sent = out.write_all(header.as_bytes()).and_then(|()| out.flush());
                 sent.map_err(|error| Place::Stdout.error(cannot_write(&error)))?;
                 Kind::Stdout { out, last: None }
             }

@@ -249,16 +249,16 @@ impl<R: Read> Y4mReader<R> {
         &self.place
     }
 
-    /// The planes of the next frame; `None` at the end of the stream. A frame is whole if another or the end follows it.
-    ///
-    /// # Errors
-    /// The stream cannot be read, or another one of other frames begins.
-    pub(crate) fn next_frame(&mut self) -> Result<Option<Planes>, VideoError> {
+    /// Reads the line before a frame; false at the end of the stream.
+    fn begin_frame(&mut self) -> Result<bool, VideoError> {
         let number = self.frames;
         let ahead = std::mem::take(&mut self.ahead);
         let mut input = ahead.as_slice().chain(&mut self.input);
-        let Some(line) = read_line(&mut input, &self.place)? else {
-            return Ok(None);
+        let line = read_line(&mut input, &self.place)?;
+        let (rest, _) = input.into_inner();
+        self.ahead = rest.to_vec();
+        let Some(line) = line else {
+            return Ok(false);
         };
         if let Some(rest) = line.strip_prefix(MAGIC) {
             return Err(self.place.error(format!(
@@ -273,6 +273,49 @@ impl<R: Read> Y4mReader<R> {
                 "frame {number} does not begin with FRAME; expected a whole Y4M stream; make it again"
             )));
         }
+        Ok(true)
+    }
+
+    /// The planes of the next frame as soon as its last byte is there, whatever follows it: [`Self::next_frame`] waits for the frame after it. `None` at
+    /// the end of the stream.
+    ///
+    /// # Errors
+    /// As [`Self::next_frame`], and where the frame is not whole.
+    pub(crate) fn next_at_once(&mut self) -> Result<Option<Vec<u8>>, VideoError> {
+        if !self.begin_frame()? {
+            return Ok(None);
+        }
+        let wanted = self.header.frame_bytes();
+        let ahead = std::mem::take(&mut self.ahead);
+        let mut input = ahead.as_slice().chain(&mut self.input).take(wanted as u64);
+        let mut planes = Vec::with_capacity(wanted);
+        input.read_to_end(&mut planes).map_err(|error| {
+            self.place.error(format!(
+                "it cannot be read ({error}); expected a Y4M stream; check where it comes from"
+            ))
+        })?;
+        let number = self.frames;
+        self.frames += 1;
+        match planes.len() == wanted {
+            true => Ok(Some(planes)),
+            false => Err(self.place.error(format!(
+                "it is truncated: frame {number} has {} of {wanted} bytes; expected whole frames; see why the program before the pipe ended",
+                planes.len()
+            ))),
+        }
+    }
+
+    /// The planes of the next frame; `None` at the end of the stream. A frame is whole if another or the end follows it.
+    ///
+    /// # Errors
+    /// The stream cannot be read, or another one of other frames begins.
+    pub(crate) fn next_frame(&mut self) -> Result<Option<Planes>, VideoError> {
+        let number = self.frames;
+        if !self.begin_frame()? {
+            return Ok(None);
+        }
+        let ahead = std::mem::take(&mut self.ahead);
+        let mut input = ahead.as_slice().chain(&mut self.input);
         let wanted = self.header.frame_bytes();
         let unreadable = |error: std::io::Error| {
             self.place.error(format!(

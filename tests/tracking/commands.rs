@@ -267,3 +267,41 @@ fn boards_to_print() {
         "expected `family`",
     );
 }
+
+#[test]
+fn poses_are_smoothed_within_their_covariances_where_that_is_asked_for() {
+    let folder = Folder::new();
+    let mut film = Film::around();
+    film.views = (0..8)
+        .map(|index| {
+            looking(
+                0.05 * f64::from(index),
+                0.5,
+                0.5 + 0.004 * f64::from(index * index),
+                0.1,
+            )
+        })
+        .collect();
+    film.save(&folder, "film.y4m", &markers(tags(), 4, 3, 0.04, 0.02));
+    folder.write("board.toml", BOARD);
+    let calibration = format!(
+        "%YAML:1.0\nimage_width: 480\nimage_height: 360\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 520., 0., {}, 0., 519., {}, 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.2, 0.1, 0., 0., 0. ]\n",
+        235.5, 183.5
+    );
+    folder.write("lens.yaml", calibration);
+    let line = "track film.y4m --board board.toml --board-flatness rigid --gamma 2.2 --intrinsics lens.yaml --fix-intrinsics";
+    folder.succeed(&format!("{line} -o own.json"));
+    let said = folder.succeed(&format!("{line} --smooth -o smooth.json"));
+    assert!(said.contains("smooth:  8 poses moved"), "{said}");
+    let (own, smooth) = (folder.json("own.json"), folder.json("smooth.json"));
+    let mut errors = [0.0; 2];
+    for (index, view) in film.views.iter().enumerate() {
+        for (error, poses) in errors.iter_mut().zip([&own, &smooth]) {
+            *error += off(&pose(&poses["frames"][index]), view).0.powi(2);
+        }
+        let moved_mm = 1e3 * smooth["frames"][index]["smoothed_by_m"].as_f64().unwrap();
+        assert!(moved_mm > 0.0 && moved_mm < 1.0, "{moved_mm}");
+        assert!(own["frames"][index]["smoothed_by_m"].is_null());
+    }
+    assert!(errors[1] < 1.05 * errors[0], "{errors:?}");
+}

@@ -1,6 +1,7 @@
 //! Camera poses from markers and chessboards: known cameras, real videos, and what must be refused.
 
 mod commands;
-mod film;
+pub mod film;
 mod photographs;
+mod scale;
 mod videos;

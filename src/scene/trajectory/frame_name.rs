@@ -3,6 +3,8 @@
 //! The names of a folder are told apart together: all are time stamps, or all end in numbers, or all differ in one number alone, or they
 //! have their order alone.
 
+use super::EntryKey;
+
 /// A frame as its source names it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameName {
@@ -19,6 +21,23 @@ pub struct FrameName {
 }
 
 impl FrameName {
+    /// The frame that an entry is of, as far as its key tells.
+    pub(crate) fn of_key(key: &EntryKey) -> Self {
+        let (label, file, number) = match key {
+            EntryKey::Number(number) | EntryKey::Order(number) => {
+                (format!("frame {number}"), None, *number)
+            }
+            EntryKey::Name(name) => (name.clone(), Some(name.clone()), 0),
+        };
+        Self {
+            label,
+            file,
+            number,
+            place: number,
+            time_secs: None,
+        }
+    }
+
     /// Frame `number` of a stream.
     pub fn of_stream(number: u32, stream: &str) -> Self {
         Self {

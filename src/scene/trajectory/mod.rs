@@ -13,6 +13,7 @@ mod json_intrinsics;
 mod json_values;
 mod kalibr;
 mod kitti;
+mod models;
 mod opencv;
 mod path;
 mod resolve;
@@ -111,18 +112,13 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// Reads a file, or a COLMAP folder with cameras and images, as text or binary.
+    /// Reads a file, or a COLMAP folder with cameras and images, as text or binary; of a folder of such models the largest.
     ///
     /// # Errors
     /// What cannot be used, in one line: a NaN, a pose that is not rigid, an entry without its pose, two entries for one picture.
     pub fn read(path: &Path) -> Result<Self> {
         if path.is_dir() {
-            let text = path.join("images.txt");
-            return match path.join("images.bin") {
-                binary if binary.is_file() && !text.is_file() => colmap_binary::read(path, &binary),
-                _ => colmap::read(path, &text),
-            }
-            .and_then(Self::checked);
+            return models::read(path).and_then(Self::checked);
         }
         let folder = path.parent().unwrap_or(Path::new(""));
         if path.file_name().is_some_and(|name| name == "images.bin") {
@@ -148,6 +144,17 @@ impl Trajectory {
             tum::read(path, &text)
         }
         .and_then(Self::checked)
+    }
+
+    /// Multiplies all lengths: poses of pictures alone know no metres.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        for pose in (self.entries.iter_mut()).filter_map(|entry| entry.world_from_camera.as_mut()) {
+            let position = pose.w_axis.truncate() * factor;
+            pose.w_axis = position.extend(1.0);
+        }
+        for point in &mut self.known_points {
+            point.world *= factor;
+        }
     }
 
     fn checked(self) -> Result<Self> {

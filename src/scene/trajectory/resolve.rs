@@ -41,6 +41,8 @@ pub struct Views<'a> {
     places: HashMap<&'a EntryKey, u32>,
     naming: Naming,
     is_stream: bool,
+    /// Frames without an entry have no pose; else they are errors.
+    passes_missing: bool,
     path: CameraPath,
 }
 
@@ -61,6 +63,7 @@ impl<'a> Views<'a> {
             places: HashMap::new(),
             naming: Naming::of(names),
             is_stream,
+            passes_missing: false,
             path: CameraPath::default(),
         };
         let mut by_key: HashMap<&EntryKey, &Entry> = HashMap::new();
@@ -98,6 +101,15 @@ impl<'a> Views<'a> {
             .filter_map(|entry| Some((views.time_secs(entry)?, entry.world_from_camera?)));
         views.path = CameraPath::new(keys.collect());
         Ok(views)
+    }
+
+    /// Frames that have no entry among named or numbered ones pass through, if this says so.
+    #[must_use]
+    pub fn passing_missing(self, passes_missing: bool) -> Self {
+        Self {
+            passes_missing,
+            ..self
+        }
     }
 
     /// The camera's way through all posed entries, whether or not their frames are rendered.
@@ -167,8 +179,16 @@ impl<'a> Views<'a> {
             None => self.of_stream(frame)?,
         };
         let numbered = || self.by_number.get(&frame.number).copied();
-        let entry = named.or_else(numbered);
-        Ok(self.view(entry.ok_or_else(|| self.absent(frame, ""))?))
+        match named.or_else(numbered) {
+            Some(entry) => Ok(self.view(entry)),
+            None if self.passes_missing => Ok(FrameView {
+                time_secs: None,
+                world_from_camera: None,
+                intrinsics: None,
+                focus_distance_m: None,
+            }),
+            None => Err(self.absent(frame, "")),
+        }
     }
 
     /// The entry of a file, whose extension may differ: frames are often converted after they were tracked.
@@ -263,7 +283,7 @@ impl<'a> Views<'a> {
         file_error(
             &self.trajectory.path,
             format!(
-                "it has no pose for {}{at}; expected one for each frame; add it, or null so that the frame passes through, or leave the frame out with --range",
+                "it has no pose for {}{at}; expected one for each frame; add it, or null so that the frame passes through, or leave the frame out with --range, or let all such frames pass with --missing-poses pass",
                 frame.label
             ),
         )

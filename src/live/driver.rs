@@ -1,0 +1,390 @@
+//! The newest frame, over and over.
+
+use std::time::{Duration, Instant};
+
+use glam::{DMat4, DVec3};
+
+use super::held_pose::{HeldPose, Placed};
+use super::intake::{Arrived, Intake};
+use super::ray_budget::RayBudget;
+use super::report::{Became, LiveSeconds, LiveStats, Tally};
+use super::slot::Fetched;
+use super::{LiveError, LiveEvent, LiveOptions};
+use crate::output::ExrLayers;
+use crate::pack::next_anchor;
+use crate::renderer::{
+    Budget, Filter, FrameEdit, PreviousView, Renderer, RendererOptions, Watcher,
+};
+use crate::scene::Composite;
+use crate::scene::trajectory::{CameraPath, FrameName, Intrinsics, read_intrinsics};
+use crate::scene::{
+    Camera, Content, ContentHash, Given, MotionBlurMethod, Photo, Scene, load_with,
+};
+use crate::stages::{Finished, GpuStages, finish};
+use crate::tracking::{Follower, KnownBoard, Lens, Luma, read_known_board};
+use crate::video::{FrameOutput, FrameSink, Pixels, SinkPlan, VideoFrame, decode_yuv};
+
+/// How long a wait for a frame goes on before it is asked whether to end.
+const ASK_EVERY: Duration = Duration::from_millis(100);
+/// Poses that are further apart tell no motion.
+const LONGEST_MOTION_SECS: f64 = 0.25;
+
+/// Augments a stream until it ends, or until `watcher` ends it after a frame that is whole.
+///
+/// # Errors
+/// Something cannot be read or written, or the stream breaks off. What is written stays.
+pub fn run_live(
+    options: &LiveOptions,
+    watcher: &Watcher<'_>,
+    hear: &dyn Fn(&LiveEvent<'_>),
+) -> Result<LiveStats, LiveError> {
+    let known = read_known_board(&options.board)?;
+    let intrinsics = options.intrinsics.as_deref().map(read_intrinsics);
+    let intrinsics = intrinsics.transpose()?;
+    let intake = Intake::open(&options.input, options.matrix)?;
+    let begin = Instant::now();
+    let mut live = Live {
+        options,
+        known,
+        intrinsics,
+        begin,
+        rate: intake.header.frames_per_second(),
+        held: HeldPose::new(options.hold),
+        budget: RayBudget::new(options.frame_secs, 1),
+        tally: Tally::default(),
+        started: None,
+        sink: open_sink(options, &intake)?,
+        intake,
+        hear,
+    };
+    let mut window_began = begin;
+    let end = loop {
+        if watcher.is_cancelled() {
+            break Ok(());
+        }
+        match live.intake.take(ASK_EVERY) {
+            Fetched::Newest(arrived) => live.take(arrived)?,
+            Fetched::Nothing => {}
+            Fetched::End(how) => break how,
+        }
+        if window_began.elapsed() >= options.summary_every {
+            live.close_window(&mut window_began);
+        }
+    };
+    live.close_window(&mut window_began);
+    let stats = live.end()?;
+    end?;
+    Ok(stats)
+}
+
+fn open_sink(options: &LiveOptions, intake: &Intake) -> Result<FrameSink, LiveError> {
+    let is_film = options.output.extension().is_some_and(|e| e == "y4m");
+    if !is_film && options.output.as_os_str() != "-" {
+        return Err(LiveError::Unfit(format!(
+            "{}: a stream goes to a film; expected a .y4m file, or -; name one",
+            options.output.display()
+        )));
+    }
+    // No other run's frames are these.
+    let mut hash = ContentHash::default();
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    format!("{now:?}").add_to(&mut hash);
+    Ok(FrameSink::open(SinkPlan {
+        path: &options.output,
+        output: FrameOutput::of(&options.output, None)?,
+        layers: ExrLayers::new(&[]),
+        composite: Composite::Additive,
+        fingerprint: hash.finish(),
+        header: intake.header.clone(),
+        png_bits: None,
+        overwrite: options.overwrite,
+        names: Vec::new(),
+    })?)
+}
+
+struct Live<'a> {
+    options: &'a LiveOptions,
+    known: KnownBoard,
+    intrinsics: Option<Intrinsics>,
+    begin: Instant,
+    /// Frames a second of the stream.
+    rate: Option<f64>,
+    intake: Intake,
+    sink: FrameSink,
+    held: HeldPose,
+    budget: RayBudget,
+    tally: Tally,
+    started: Option<Started>,
+    hear: &'a dyn Fn(&LiveEvent<'_>),
+}
+
+/// What the first frame brings to life.
+struct Started {
+    follower: Follower,
+    /// The scene's, at the pose of the moment.
+    camera: Camera,
+    lens: crate::scene::Lens,
+    seed: u32,
+    anchor: Option<DVec3>,
+    /// When the frame before was, and from where, unless it passed through.
+    before: Option<(f64, DMat4)>,
+    /// The last frame taken up.
+    number: Option<u32>,
+    /// Until the first pose, ...
+    scene: Option<Scene>,
+    /// ... and from then on.
+    running: Option<Running>,
+}
+
+struct Running {
+    renderer: Renderer,
+    gpu: Option<GpuStages>,
+    /// Notes of the renderer that were told.
+    notes: usize,
+}
+
+impl Live<'_> {
+    fn take(&mut self, arrived: Arrived) -> Result<(), LiveError> {
+        let Arrived { number, planes, at } = arrived;
+        let name = FrameName::of_stream(number, "the stream");
+        let mut seconds = LiveSeconds::default();
+        let mut clock = Clock::start();
+        let header = &self.intake.header;
+        let codes = decode_yuv(header, &planes);
+        let photo = Photo::from_srgb8(header.width, header.height, codes);
+        seconds.decode = clock.lap();
+        let mut started = match self.started.take() {
+            Some(started) => started,
+            None => self.start(&photo)?,
+        };
+        clock.lap();
+        let found = started.follower.follow(&Luma::of(&photo));
+        let pose = found.map_err(|why| self.tally.lacks_pose(why)).ok();
+        let pose = pose.map(|pose| pose.world_from_camera());
+        let placed = self.held.place(pose, at.duration_since(self.begin));
+        seconds.track = clock.lap();
+        if self.options.keep_time {
+            let last = started.number.map_or(number, |last| last + 1);
+            for _ in last..number {
+                self.sink.stand_in(&name)?;
+            }
+        }
+        started.number = Some(number);
+        let frame = VideoFrame {
+            photo,
+            pixels: Pixels::Planes(planes),
+            warnings: Vec::new(),
+        };
+        let became = match placed.world_from_camera() {
+            None => {
+                started.before = None;
+                self.sink.pass(&name, &frame)?;
+                Became::PassedThrough
+            }
+            Some(world_from_camera) => {
+                let rays_per_pixel = self.budget.rays();
+                let is_first = started.running.is_none();
+                let picture = self.render(
+                    &mut started,
+                    world_from_camera,
+                    &frame.photo,
+                    number,
+                    &mut seconds,
+                )?;
+                clock.lap();
+                self.sink.write(&name, &picture, &frame)?;
+                seconds.write = clock.lap();
+                // The first frame also waited for the scene's trees.
+                if !is_first {
+                    let beside = seconds.total() - seconds.render;
+                    self.budget.took(seconds.render, beside);
+                }
+                match placed {
+                    Placed::Held(_) => Became::Held { rays_per_pixel },
+                    _ => Became::Rendered { rays_per_pixel },
+                }
+            }
+        };
+        self.started = Some(started);
+        self.tally.add(became, at.elapsed().as_secs_f64(), &seconds);
+        Ok(())
+    }
+
+    fn start(&mut self, photo: &Photo) -> Result<Started, LiveError> {
+        let options = self.options;
+        let given = Given {
+            photo: Some(photo.clone()),
+            intrinsics: self.intrinsics,
+            sandbox: options.sandbox,
+        };
+        let mut scene = load_with(&options.scene, given)?;
+        scene.settings.apply(&options.overrides);
+        for warning in &scene.warnings {
+            (self.hear)(&LiveEvent::Warning(warning));
+        }
+        self.budget = RayBudget::new(options.frame_secs, scene.settings.rays_per_pixel);
+        let camera = scene.camera.clone();
+        let lens = Lens {
+            focal: [camera.fx, camera.fy].into(),
+            centre: [camera.cx, camera.cy].into(),
+            distortion: camera.distortion,
+        };
+        let known = self.known.clone();
+        Ok(Started {
+            follower: Follower::new(known, options.family, lens, options.tone),
+            lens: scene.lens,
+            camera,
+            seed: scene.settings.seed,
+            anchor: None,
+            before: None,
+            number: None,
+            scene: Some(scene),
+            running: None,
+        })
+    }
+
+    /// The finished picture of a frame seen from there.
+    fn render(
+        &self,
+        started: &mut Started,
+        world_from_camera: DMat4,
+        photo: &Photo,
+        number: u32,
+        seconds: &mut LiveSeconds,
+    ) -> Result<crate::film::Picture, LiveError> {
+        let camera = Camera {
+            world_from_camera,
+            ..started.camera.clone()
+        };
+        let time_secs = match self.rate {
+            Some(rate) => f64::from(number) / rate,
+            None => self.begin.elapsed().as_secs_f64(),
+        };
+        let near = |at: &f64| (time_secs - at).abs() <= LONGEST_MOTION_SECS;
+        let before = started.before.replace((time_secs, world_from_camera));
+        let keys = before.filter(|(at, _)| near(at)).into_iter();
+        let camera_path = CameraPath::new(keys.chain([(time_secs, world_from_camera)]).collect());
+        let position = world_from_camera.w_axis.truncate();
+        started.anchor = Some(next_anchor(started.anchor, position));
+        let mut clock = Clock::start();
+        let running = match (started.running.take(), started.scene.take()) {
+            (Some(running), _) => running,
+            (None, Some(scene)) => Running::begin(scene, &camera, self.options)?,
+            (None, None) => unreachable!("there is a scene until it runs"),
+        };
+        let Running {
+            renderer,
+            gpu,
+            notes,
+        } = started.running.insert(running);
+        clock.lap();
+        let edit = FrameEdit {
+            photo: Some(photo.clone()),
+            camera,
+            lens: started.lens,
+            camera_path,
+            time_secs,
+            seed: started.seed.wrapping_add(number),
+            anchor: started.anchor,
+        };
+        renderer.set_frame(edit, &Watcher::none())?;
+        seconds.edit = clock.lap();
+        let pixels = u64::from(photo.width) * u64::from(photo.height);
+        let rays = Budget::Rays(pixels * u64::from(self.budget.rays()));
+        renderer.advance(rays, &Watcher::none())?;
+        seconds.render = clock.lap();
+        let picture = renderer.delivered().picture;
+        seconds.composite = clock.lap();
+        let wants_motion = (renderer.scene().stages.motion_blur)
+            .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);
+        let motion = before.filter(|_| wants_motion).map(|(time_secs, pose)| {
+            renderer.picture_motion(&PreviousView {
+                world_from_camera: pose,
+                time_secs,
+            })
+        });
+        let film = renderer.film();
+        let Finished {
+            picture,
+            notes: told,
+            seconds: of_stages,
+        } = finish(
+            picture,
+            film,
+            renderer.scene(),
+            number,
+            motion.as_ref(),
+            gpu.as_ref(),
+        );
+        seconds.stages = of_stages;
+        let all = renderer.notes();
+        for note in all.iter().skip(*notes) {
+            (self.hear)(&LiveEvent::Note(note));
+        }
+        if self.tally.written() == 0 {
+            for note in &told {
+                (self.hear)(&LiveEvent::Note(note));
+            }
+        }
+        *notes = all.len();
+        Ok(picture)
+    }
+
+    fn close_window(&mut self, began: &mut Instant) {
+        let seconds = began.elapsed().as_secs_f64();
+        *began = Instant::now();
+        let window = self.tally.close_window(self.intake.counts(), seconds);
+        (self.hear)(&LiveEvent::Summary(window));
+    }
+
+    fn end(self) -> Result<LiveStats, LiveError> {
+        self.sink.finish()?;
+        let running = self.started.and_then(|started| started.running);
+        let renderer = running.map(|running| running.renderer);
+        Ok(LiveStats {
+            total: self.tally.total(self.begin.elapsed().as_secs_f64()),
+            windows: self.tally.windows,
+            seconds: self.tally.seconds,
+            backend: renderer
+                .as_ref()
+                .map_or("none", Renderer::backend_name)
+                .to_owned(),
+            device: renderer
+                .map_or_else(|| "nothing".to_owned(), |renderer| renderer.device_name()),
+        })
+    }
+}
+
+impl Running {
+    /// Builds what the first pose needs.
+    fn begin(mut scene: Scene, camera: &Camera, options: &LiveOptions) -> Result<Self, LiveError> {
+        scene.camera = camera.clone();
+        let with = RendererOptions {
+            filter: options.filter.then_some(Filter::Preview),
+            draft: true,
+            ..RendererOptions::default()
+        };
+        let renderer = Renderer::new(scene, with, &Watcher::none())?;
+        Ok(Self {
+            gpu: renderer.gpu_device().cloned().map(GpuStages::new),
+            renderer,
+            notes: 0,
+        })
+    }
+}
+
+/// Takes times one after the other.
+struct Clock(Instant);
+
+impl Clock {
+    fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    /// Seconds since the last lap.
+    fn lap(&mut self) -> f64 {
+        let seconds = self.0.elapsed().as_secs_f64();
+        self.0 = Instant::now();
+        seconds
+    }
+}

@@ -1,0 +1,126 @@
+//! A board and what was learnt of it: the report of a tracked video, or a board's file as it is.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::DVec3;
+use serde::Deserialize;
+
+use super::TrackError;
+use super::board::{Board, BoardKind};
+use super::board_file::{family_named, read_board};
+use super::light::Tone;
+
+/// Standard deviation of a corner along an axis where paper is taken for flat, pixels.
+const NOISE_OF_FLAT_PX: f64 = 0.3;
+
+/// Where the points of a board are, and how well they are seen.
+#[derive(Clone, Debug)]
+pub struct KnownBoard {
+    pub board: Board,
+    /// Standard deviation of a corner along an axis, pixels.
+    pub noise_px: f64,
+    /// How codes become light, where it was learnt.
+    pub tone: Option<Tone>,
+}
+
+/// What `mixray track --report` has written, as far as it is needed.
+#[derive(Deserialize)]
+struct Report {
+    gamma: String,
+    corner_sigma_px: f64,
+    family: Option<Named>,
+    board: Surface,
+}
+
+#[derive(Deserialize)]
+struct Named {
+    name: String,
+}
+
+#[derive(Deserialize)]
+struct Surface {
+    #[serde(default)]
+    chessboard: Option<Squares>,
+    first_point_of_marker: BTreeMap<u32, usize>,
+    points_m: Vec<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+struct Squares {
+    columns: usize,
+    rows: usize,
+    square_m: f64,
+}
+
+/// Reads a report of a tracked video (JSON), whose board is as it was found, bent paper and all; or what [`read_board`] reads.
+///
+/// # Errors
+/// What cannot be used.
+pub fn read_known_board(path: &Path) -> Result<KnownBoard, TrackError> {
+    let is_report = std::fs::read_to_string(path)
+        .ok()
+        .filter(|text| text.trim_start().starts_with('{'));
+    let Some(text) = is_report else {
+        return Ok(KnownBoard {
+            board: read_board(path)?,
+            noise_px: NOISE_OF_FLAT_PX,
+            tone: None,
+        });
+    };
+    let known = serde_json::from_str(&text)
+        .map_err(|error| error.to_string())
+        .and_then(of_report);
+    known.map_err(|problem| {
+        TrackError::input(format!(
+            "{}: {problem}; expected the report of a tracked video; write it with mixray track --report",
+            path.display()
+        ))
+    })
+}
+
+fn of_report(report: Report) -> Result<KnownBoard, String> {
+    let points: Vec<DVec3> = report
+        .board
+        .points_m
+        .iter()
+        .copied()
+        .map(DVec3::from)
+        .collect();
+    let is_inside = |first: &usize| first.checked_add(4).is_some_and(|end| end <= points.len());
+    if !report.board.first_point_of_marker.values().all(is_inside) {
+        return Err("a marker's points are not there".to_owned());
+    }
+    let kind = match report.board.chessboard {
+        Some(Squares { columns, rows, .. }) if columns.checked_mul(rows) != Some(points.len()) => {
+            return Err(format!("{columns} x {rows} corners are not there"));
+        }
+        Some(Squares {
+            columns,
+            rows,
+            square_m,
+        }) => BoardKind::Chessboard {
+            columns,
+            rows,
+            square_m,
+        },
+        None => BoardKind::Markers,
+    };
+    let tone = match report.gamma.as_str() {
+        "srgb" => Tone::Srgb,
+        power => Tone::Power(power.parse().map_err(|_| format!("gamma is {power}"))?),
+    };
+    Ok(KnownBoard {
+        board: Board {
+            points,
+            markers: report.board.first_point_of_marker,
+            family: report
+                .family
+                .map(|family| family_named(&family.name))
+                .transpose()?,
+            kind,
+        },
+        noise_px: report.corner_sigma_px,
+        tone: Some(tone),
+    })
+}

@@ -1,0 +1,215 @@
+//! `mixray live` on films whose camera is known, fed frame by frame.
+
+use std::io::{Read, Write};
+use std::process::{Child, Stdio};
+
+use glam::DVec3;
+use mixray::tracking::Family;
+
+use crate::support::{Folder, Random, stderr};
+use crate::tracking::film::{Film, View, markers};
+
+const BOARD: &str =
+    "family = \"apriltag-36h11\"\n[grid]\ncolumns = 4\nrows = 3\nside_m = 0.04\ngap_m = 0.02\n";
+
+const SCENE: &str = "[camera]
+fx = 520.0
+fy = 519.0
+cx = 236.0
+cy = 184.0
+distortion = [-0.2, 0.1, 0.0, 0.0]
+[environment]
+radiance = [1.0, 1.0, 1.0]
+[[virtual]]
+shape = \"box\"
+size = [0.04, 0.04, 0.04]
+translation = [0.0, 0.0201, 0.0]
+";
+
+const LIVE: &str = "live scene.toml --board board.toml --gamma 2.2 --backend cpu --rpp 2";
+
+/// Five views, the marker out of sight in the fourth.
+fn film() -> Film {
+    let mut film = Film::around();
+    film.views.truncate(4);
+    let away = View {
+        translation: DVec3::new(0.0, 9.0, 1.0),
+        ..film.views[2]
+    };
+    film.views.insert(3, away);
+    film
+}
+
+/// The scene, the board, and the film as the stream's bytes.
+fn prepared() -> (Folder, Vec<u8>) {
+    let folder = Folder::new();
+    folder.write("board.toml", BOARD);
+    folder.write("scene.toml", SCENE);
+    let tags = Family::named("apriltag-36h11").unwrap();
+    film().save(&folder, "film.y4m", &markers(tags, 4, 3, 0.04, 0.02));
+    let stream = folder.bytes("film.y4m");
+    (folder, stream)
+}
+
+/// The header with its end, and the frames with their markers.
+fn parts(stream: &[u8]) -> (&[u8], Vec<&[u8]>) {
+    let header = 1 + stream.iter().position(|byte| *byte == b'\n').unwrap();
+    let planes = 480 * 360 * 3 / 2;
+    let frames = stream[header..].chunks(b"FRAME\n".len() + planes);
+    (&stream[..header], frames.collect())
+}
+
+fn begin(folder: &Folder, line: &str) -> Child {
+    let mut command = folder.command(line);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped());
+    command.stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Sends each frame once the one before has come back; what came back.
+fn in_step(folder: &Folder, line: &str, stream: &[u8]) -> Vec<Vec<u8>> {
+    let (header, frames) = parts(stream);
+    let mut child = begin(folder, line);
+    let (mut to, mut from) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+    to.write_all(header).unwrap();
+    let mut all = Vec::new();
+    for (index, frame) in frames.into_iter().enumerate() {
+        to.write_all(frame).unwrap();
+        if index == 0 {
+            let mut back = vec![0; header.len()];
+            from.read_exact(&mut back).unwrap();
+            assert_eq!(back, header, "a stream's form is kept");
+        }
+        let mut back = vec![0; frame.len()];
+        from.read_exact(&mut back).unwrap();
+        all.push(back);
+    }
+    drop(to);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    all
+}
+
+/// Pixels whose brightness differs.
+fn changed(a: &[u8], b: &[u8]) -> usize {
+    let luma = b"FRAME\n".len()..480 * 360;
+    a[luma.clone()]
+        .iter()
+        .zip(&b[luma])
+        .filter(|(a, b)| a != b)
+        .count()
+}
+
+#[test]
+fn a_frame_goes_out_before_the_next_comes_and_a_lost_marker_keeps_its_pose_for_a_while() {
+    let (folder, stream) = prepared();
+    let (_, frames) = parts(&stream);
+    let held = in_step(
+        &folder,
+        &format!("{LIVE} --hold 100 --stats stats.json"),
+        &stream,
+    );
+    for (frame, out) in frames.iter().zip(&held) {
+        let share = changed(frame, out) as f64 / (480.0 * 360.0);
+        assert!((0.002..0.2).contains(&share), "the box covers {share}");
+    }
+    let counts = folder.json("stats.json")["total"]["frames"].clone();
+    assert_eq!(
+        (&counts["rendered"], &counts["held"]),
+        (&4.into(), &1.into())
+    );
+    assert_eq!(
+        (&counts["arrived"], &counts["dropped"]),
+        (&5.into(), &0.into())
+    );
+    let passed = in_step(&folder, &format!("{LIVE} --hold 0"), &stream);
+    assert_eq!(
+        passed[3], frames[3],
+        "without a pose a frame passes through"
+    );
+    assert!(changed(frames[2], &passed[2]) > 300);
+}
+
+#[test]
+fn the_newest_frame_wins_and_the_others_are_counted_in_order() {
+    let (folder, stream) = prepared();
+    let (_, frames) = parts(&stream);
+    let mut long = stream.clone();
+    for _ in 0..7 {
+        long.extend(frames.concat());
+    }
+    let mut child = begin(&folder, &format!("{LIVE} --stats stats.json"));
+    let mut to = child.stdin.take().unwrap();
+    let sent = long.clone();
+    let feeding = std::thread::spawn(move || to.write_all(&sent));
+    let output = child.wait_with_output().unwrap();
+    feeding.join().unwrap().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let (_, out) = parts(&output.stdout);
+    let counts = folder.json("stats.json")["total"]["frames"].clone();
+    let count = |name: &str| counts[name].as_u64().unwrap();
+    let written = count("rendered") + count("held") + count("passed_through");
+    assert_eq!(count("arrived"), 40);
+    assert_eq!(count("dropped") + written, 40);
+    assert_eq!(out.len() as u64, written);
+    // The upper left corner is the photograph's, and noise makes each view's its own.
+    let corner = |frame: &[u8]| frame[..600].to_vec();
+    let view = |frame: &[u8]| frames.iter().position(|own| corner(own) == corner(frame));
+    assert!(out.iter().all(|frame| view(frame).is_some()));
+    assert_eq!(view(out[out.len() - 1]), Some(4), "the last frame goes out");
+}
+
+#[test]
+fn streams_that_break_off_change_or_are_noise_end_with_an_error() {
+    let (folder, stream) = prepared();
+    let fed = |bytes: &[u8]| {
+        folder.write("in.y4m", bytes);
+        folder.run(&format!("{LIVE} --input in.y4m"))
+    };
+    let (header, frames) = parts(&stream);
+    let refused = |bytes: &[u8], part: &str| {
+        let output = fed(bytes);
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        assert!(stderr(&output).contains(part), "{}", stderr(&output));
+    };
+    refused(&stream[..stream.len() - 4000], "truncated");
+    let smaller = String::from_utf8_lossy(header).replace("W480", "W240");
+    let change = [header, frames[0], smaller.as_bytes(), frames[1]].concat();
+    refused(&change, "expected frames of one size");
+    refused(b"no stream\n", "YUV4MPEG2");
+    let mut random = Random(5);
+    let mut noise = [header, b"FRAME\n"].concat();
+    noise.extend((0..480 * 360 * 3 / 2).map(|_| random.bits() as u8));
+    let output = fed(&noise);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(parts(&output.stdout).1, [&noise[header.len()..]]);
+    refused(
+        &[&noise[..], &noise[header.len() + 6..]].concat(),
+        "does not begin with FRAME",
+    );
+    folder.refuse(
+        "live scene.toml --board board.toml --input in.y4m -o out.png",
+        ".y4m file",
+    );
+    folder.refuse(
+        "live scene.toml --board absent.toml --input in.y4m",
+        "cannot be read",
+    );
+}
+
+#[test]
+fn a_board_is_taken_over_as_it_was_learnt() {
+    let (folder, stream) = prepared();
+    folder.succeed("track film.y4m --board board.toml --board-flatness rigid -o poses.json --report track.json");
+    let line =
+        "live scene.toml --board track.json --intrinsics poses.yaml --backend cpu --rpp 1 --hold 0";
+    let (_, frames) = parts(&stream);
+    let out = in_step(&folder, line, &stream);
+    assert!(changed(frames[0], &out[0]) > 300);
+    assert_eq!(changed(frames[3], &out[3]), 0);
+    folder.write("wrong.json", "{ \"gamma\": \"srgb\" }");
+    folder.write("film.y4m", &stream);
+    folder.refuse(
+        "live scene.toml --board wrong.json --input film.y4m",
+        "--report",
+    );
+}
