@@ -67,44 +67,7 @@ impl Arguments {
     }
 }
 
-impl Arguments {
-    fn scale(&self) -> Result<Option<ScaleFrom>, Failure> {
-        let Some((ends, metres)) = self.scale_from.clone() else {
-            return Ok(None);
-        };
-        let sightings = match &self.clicks {
-            Some(path) => read_clicks(path)?,
-            None => marker_sightings(self.frames.as_deref(), &ends)?,
-        };
-        Ok(Some(ScaleFrom {
-            ends,
-            metres,
-            sightings,
-        }))
-    }
-}
-
-/// Middles of the markers with these ids.
-#[cfg(feature = "track")]
-fn marker_sightings(frames: Option<&Path>, ends: &[String; 2]) -> Result<Vec<Sighting>, Failure> {
-    let frames = frames.filter(|path| *path != Path::new("-"));
-    let frames = frames.ok_or_else(|| {
-        Failure("--scale-from by markers: it needs the frames twice; expected a folder or a file as --frames; name it, or give --clicks".to_owned())
-    })?;
-    let ids = ends.clone().map(|end| end.parse::<u32>());
-    let [Ok(a), Ok(b)] = ids else {
-        return Err(Failure(format!(
-            "--scale-from {},{}: no ids of markers; expected two numbers, or --clicks CLICKS.csv that has these points; correct them",
-            ends[0], ends[1]
-        )));
-    };
-    Ok(crate::tracking::sight_markers(frames, [a, b])?)
-}
-
-#[cfg(not(feature = "track"))]
-fn marker_sightings(_: Option<&Path>, _: &[String; 2]) -> Result<Vec<Sighting>, Failure> {
-    Err(Failure("--scale-from: this program was built without markers; expected --clicks CLICKS.csv; give it".to_owned()))
-}
+impl Arguments {}
 
 fn check(arguments: &Arguments, points: Option<&Path>) -> Result<Outcome, Failure> {
     let reprojection = check_poses(&arguments.options()?, points, &tell)?;

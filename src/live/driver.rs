@@ -307,6 +307,7 @@ impl Live<'_> {
         let Finished {
             picture,
             notes: told,
+            noise: _,
             seconds: of_stages,
         } = finish(
             picture,
