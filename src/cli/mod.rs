@@ -73,7 +73,7 @@ enum Command {
     Preview(preview::Arguments),
     Check(check::Arguments),
     Pick(pick::Arguments),
-    Sequence(sequence::Arguments),
+    Sequence(Box<sequence::Arguments>),
     #[cfg(feature = "track")]
     Track(Box<track::Arguments>),
     #[cfg(feature = "start")]

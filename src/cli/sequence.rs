@@ -67,8 +67,6 @@ impl Arguments {
     }
 }
 
-impl Arguments {}
-
 fn check(arguments: &Arguments, points: Option<&Path>) -> Result<Outcome, Failure> {
     let reprojection = check_poses(&arguments.options()?, points, &tell)?;
     print(&reprojection.text)?;

@@ -29,7 +29,8 @@ pub fn sight_markers(path: &Path, ids: [u32; 2]) -> Result<Vec<Sighting>, TrackE
         .max(1);
     let mut frames = Vec::new();
     while frames.len() < MOST_FRAMES
-        && let Some((name, taken)) = source.next(&|name| name.place as usize % step == 0)?
+        && let Some((name, taken)) =
+            source.next(&|name| (name.place as usize).is_multiple_of(step))?
     {
         if let Taken::Whole(frame) = taken {
             frames.push((name, Luma::of(&frame.photo)));

@@ -322,8 +322,8 @@ mod tests {
         let answer: Vec<f64> = (0..size).map(|k| (k as f64).sin()).collect();
         let mut system = Banded::new(size);
         for i in 0..size {
-            for j in 0..size {
-                system.right[i] += entry(i, j) * answer[j];
+            for (j, value) in answer.iter().enumerate() {
+                system.right[i] += entry(i, j) * value;
                 if j <= i && i - j < Banded::WIDTH {
                     system.add(i, j, entry(i, j));
                 }
