@@ -17,9 +17,9 @@ struct Ray {
 }
 
 @if(shallow_trees)
-const STACK_LEVELS: u32 = SHALLOW_LEVELS;
+const STACK_LEVELS = SHALLOW_LEVELS;
 @if(!shallow_trees)
-const STACK_LEVELS: u32 = MOST_LEVELS;
+const STACK_LEVELS = MOST_LEVELS;
 
 var<workgroup> trace_stack: array<vec2<u32>, STACK_LEVELS * WORKGROUP>;
 

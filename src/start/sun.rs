@@ -127,7 +127,7 @@ mod tests {
     fn a_post_and_its_shadow_tell_the_sun() {
         let camera = camera_over_ground((640, 480), 500.0, up_of_pitch(20.0), 1.6);
         let (foot, top) = (DVec3::new(0.3, 0.0, -4.0), DVec3::new(0.3, 0.8, -4.0));
-        let truth = DVec3::new(-0.5, -0.7, 0.3).normalize();
+        let truth = DVec3::new(-0.5, -0.7, 0.6).normalize();
         let tip = top - truth * (top.y / truth.y);
         let pixel = |p: DVec3| project(&camera, p).unwrap().truncate();
         // Lit ground of 0.4, a shadow of 0.1.

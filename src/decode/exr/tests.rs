@@ -77,12 +77,15 @@ fn layers_by_prefix_are_taken_as_parts_are() {
     let combined = ["A.Combined.R", "A.Combined.G", "A.Combined.B"];
     let bytes = file(vec![layer(None, combined, 7.0)], window());
     assert_eq!(red(&bytes).map(|red| red[..2].to_vec()), Ok(vec![7.0, 8.0]));
-    for names in [
-        ["beauty.r", "beauty.g", "beauty.b"],
-        ["Red", "Green", "Blue"],
+    for (part, names) in [
+        ("b", ["beauty.r", "beauty.g", "beauty.b"]),
+        ("main", ["Red", "Green", "Blue"]),
     ] {
         let albedo = ["albedo.R", "albedo.G", "albedo.B"];
-        let layers = vec![layer(Some("a"), albedo, 90.0), layer(Some("b"), names, 7.0)];
+        let layers = vec![
+            layer(Some("a"), albedo, 90.0),
+            layer(Some(part), names, 7.0),
+        ];
         let red = red(&file(layers, window())).map(|red| red[0]);
         assert_eq!(red, Ok(7.0), "{names:?}");
     }

@@ -318,8 +318,8 @@ const TRACES: &[Trace] = &[
     Trace {
         feature: "shallow_trees",
         kernel: "kernel_trace",
-        with: &["STACK_LEVELS: u32 = accel_trace__SHALLOW_LEVELS"],
-        without: &["STACK_LEVELS: u32 = accel_trace__MOST_LEVELS"],
+        with: &["STACK_LEVELS = accel_trace__SHALLOW_LEVELS"],
+        without: &["STACK_LEVELS = accel_trace__MOST_LEVELS"],
         ..ADVANCE
     },
     Trace {

@@ -83,6 +83,11 @@ impl Block {
     fn mean_variance(&self) -> f64 {
         self.variance.iter().sum::<f64>() / 3.0
     }
+
+    /// How much it counts where all levels are taken together: texture, which is left in levels that have no flat block, counts little.
+    fn weight(&self) -> f64 {
+        1.0 / self.mean_variance().max(1e-9)
+    }
 }
 
 /// Measures the noise of one photograph, as stored, in a profile of `bins` bins. `source` names the photograph.
@@ -120,7 +125,7 @@ pub fn estimate_from_one(
         quantum * quantum * variance_before_rounding(whole)
     };
     let correlation = [0, 1, 2].map(|c| {
-        let measured = all.iter().map(|block| block.variance[c]).sum::<f64>() / all.len() as f64;
+        let measured = weighted_mean(&all, |block| block.variance[c]);
         let whole = measured / (1.0 - taken[c]);
         let rounded = whole / true_variance(measured, c).max(1e-6);
         unbiased(&raw[c], taken[c], rounded)
@@ -196,7 +201,15 @@ fn flattest(mut blocks: Vec<Block>) -> Vec<Block> {
     blocks
 }
 
-/// Autocorrelation of the residuals, each block weighted by its own variance, 1 at lag 0.
+/// Mean of `value` by the blocks' weights.
+fn weighted_mean(blocks: &[&Block], value: impl Fn(&Block) -> f64 + Sync) -> f64 {
+    let terms: Vec<f64> = (blocks.par_iter())
+        .map(|block| block.weight() * value(block))
+        .collect();
+    terms.iter().sum::<f64>() / blocks.iter().map(|block| block.weight()).sum::<f64>()
+}
+
+/// Autocorrelation of the residuals, each block's in units of its own variance, 1 at lag 0.
 fn autocorrelation(blocks: &[&Block], c: usize) -> Autocorrelation {
     let mut out = WHITE;
     for (dy, row) in out.iter_mut().enumerate() {
@@ -207,8 +220,7 @@ fn autocorrelation(blocks: &[&Block], c: usize) -> Autocorrelation {
             } else {
                 column as isize - LAGS as isize
             };
-            let sums = blocks.par_iter().map(|block| lag(block, c, dx, dy));
-            *rho = sums.sum::<f64>() / blocks.len() as f64;
+            *rho = weighted_mean(blocks, |block| lag(block, c, dx, dy));
         }
     }
     out
@@ -258,7 +270,7 @@ fn unbiased(measured: &Autocorrelation, taken: f64, rounded: f64) -> Autocorrela
 
 /// Correlation of two channels in one pixel.
 fn between(blocks: &[&Block], a: usize, b: usize) -> f64 {
-    let of = |block: &&Block| {
+    let of = |block: &Block| {
         let products = block
             .residuals
             .iter()
@@ -266,8 +278,7 @@ fn between(blocks: &[&Block], a: usize, b: usize) -> f64 {
         let scale = (block.variance[a] * block.variance[b]).sqrt().max(1e-9);
         products.sum::<f64>() / PIXELS / scale
     };
-    let sum: f64 = blocks.iter().map(of).sum();
-    (sum / blocks.len() as f64).clamp(-1.0, 1.0)
+    weighted_mean(blocks, of).clamp(-1.0, 1.0)
 }
 
 fn bin_of(

@@ -218,7 +218,9 @@ mod tests {
     #[test]
     fn the_sides_of_a_square_are_found_to_a_fraction_of_a_pixel() {
         for turn in [0.0, 0.2, 0.6] {
-            let found = segments(&square(turn), 5.0);
+            let mut found = segments(&square(turn), 5.0);
+            // Corners, rounded by the smoothing, make short ones.
+            found.retain(|segment| segment.length() > 20.0);
             assert_eq!(found.len(), 4, "{turn}");
             let axis = DVec2::from_angle(turn);
             for segment in found {
