@@ -44,6 +44,8 @@ fn every_kind_of_output_is_written() {
     for name in [
         "R",
         "difference.R",
+        "real.R",
+        "virtual.A",
         "variance.R",
         "mask.Y",
         "depth.Z",

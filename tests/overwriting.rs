@@ -498,11 +498,13 @@ fn benchmarks_keep_what_they_read() {
     );
     let section = "# <!-- bench -->\n# <!-- end -->\n";
     folder.write("scene.toml", SCENE.to_owned() + section);
+    std::fs::hard_link(folder.path("scene.toml"), folder.path("scene.md")).unwrap();
     folder.refused(
-        &mut folder.command(&format!("{bench} -o out --write-docs scene.toml")),
-        "scene.toml",
+        &mut folder.command(&format!("{bench} -o out --write-docs scene.md")),
+        "scene.md",
         "scene.toml",
     );
+    folder.remove("scene.md");
     folder.write("page.md", section);
     folder.succeed(&format!(
         "{bench} -o new --against out/results.json --write-docs page.md --tolerance 1e9"

@@ -26,9 +26,6 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let scene = arguments.flags.load(&arguments.scene)?;
-    for warning in &scene.warnings {
-        say("warning", warning);
-    }
     let bundle = gather(&scene)?;
     let output = &arguments.output;
     match output
@@ -40,6 +37,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             bundle.write_into(folder)?;
             check(&bundle, &scene, folder)
         })?,
+    }
+    for warning in &scene.warnings {
+        say("warning", warning);
     }
     print(&format!(
         "bundle {} ({} files, scene file {})\n",

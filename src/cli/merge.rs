@@ -78,7 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let total = first.note.total;
     let bar = Bar::new("building trees", "rays per pixel");
     let hear = |progress: &Progress| bar.hear(progress);
-    let layers = ExrLayers::new(&arguments.layers);
+    let layers = ExrLayers::new(&arguments.layers, scene.settings.composite);
     let is_exr = targets.iter().any(|target| target.format() == Format::Exr);
     let renderer = Renderer::with_film(
         scene,

@@ -31,9 +31,9 @@ pub(super) struct Arguments {
     /// Picture to write, .png or .exr; may be given several times [default: the scene's folder name + .png]
     #[arg(short, long, value_name = "OUT")]
     output: Vec<PathBuf>,
-    /// Layers of .exr pictures, with commas between: composite, virtual, change, ratio, noise, mask, depth, normal, variance, samples, which
-    /// are the default, difference, albedo, real, mixed. real and mixed ask for the real light everywhere, which may cost several times the
-    /// rest
+    /// Layers of .exr pictures, with commas between: composite, difference, virtual, change, ratio, noise, mask, depth, normal, variance,
+    /// samples, which are the default, and albedo, real, mixed. real and mixed ask for the real light everywhere, which may cost several times
+    /// the rest; the quotient composite does anyhow, and has real by default
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     layers: Vec<ExrLayer>,
     #[command(flatten)]
@@ -133,7 +133,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let load_secs = start.elapsed().as_secs_f64();
 
     let is_exr = targets.iter().any(|t| t.format() == Format::Exr);
-    let layers = ExrLayers::new(&job.layers);
+    let layers = ExrLayers::new(&job.layers, scene.settings.composite);
     let options = RendererOptions {
         // A film has what merge cannot make up for.
         guides: is_exr && (layers.need_guides() || job.range.is_some()),

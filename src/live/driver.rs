@@ -92,7 +92,7 @@ fn open_sink(options: &LiveOptions, intake: &Intake) -> Result<FrameSink, LiveEr
     Ok(FrameSink::open(SinkPlan {
         path: &options.output,
         output: FrameOutput::of(&options.output, None)?,
-        layers: ExrLayers::new(&[]),
+        layers: ExrLayers::new(&[], Composite::Additive),
         composite: Composite::Additive,
         fingerprint: hash.finish(),
         header: intake.header.clone(),

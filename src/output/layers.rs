@@ -1,5 +1,7 @@
 //! Which planes a picture is written with.
 
+use crate::scene::Composite;
+
 /// A layer of an EXR file; the composite has no name there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExrLayer {
@@ -38,8 +40,9 @@ impl ExrLayer {
     ];
 
     /// What a compositor needs, without light that the composite does not take: depth and normal cost each ray its first hit.
-    const USUAL: [Self; 10] = [
+    const USUAL: [Self; 11] = [
         Self::Composite,
+        Self::Difference,
         Self::Virtual,
         Self::Change,
         Self::Ratio,
@@ -69,12 +72,13 @@ impl std::str::FromStr for ExrLayer {
 pub struct ExrLayers(Vec<ExrLayer>);
 
 impl ExrLayers {
-    /// Those asked for; of none, those that are usual.
-    pub fn new(asked: &[ExrLayer]) -> Self {
-        match asked {
-            [] => Self(ExrLayer::USUAL.to_vec()),
-            asked => Self(asked.to_vec()),
+    /// Those asked for; of none, those that are usual: with the real light where the composite takes it everywhere.
+    pub fn new(asked: &[ExrLayer], composite: Composite) -> Self {
+        if !asked.is_empty() {
+            return Self(asked.to_vec());
         }
+        let real = (composite == Composite::Quotient).then_some(ExrLayer::Real);
+        Self(ExrLayer::USUAL.into_iter().chain(real).collect())
     }
 
     /// Real rays are traced where nothing virtual needs them.

@@ -128,7 +128,7 @@ fn render(
     let written = match is_exr {
         true => {
             let metadata = Metadata::of(&renderer, scene.fingerprint());
-            let layers = ExrLayers::new(&[]);
+            let layers = ExrLayers::new(&[], scene.settings.composite);
             let exr = ExrPicture::of(&renderer, metadata, &film, finished, &layers);
             write_exr(target, &exr)
         }

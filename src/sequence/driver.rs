@@ -407,7 +407,7 @@ impl Sequence<'_> {
         let options = self.whole.options;
         let mut header = header.unwrap_or_else(|| Header::new(size.0, size.1, self.whole.rate));
         header.matrix = options.matrix.unwrap_or(header.matrix);
-        let layers = ExrLayers::new(&options.layers);
+        let layers = ExrLayers::new(&options.layers, scene.settings.composite);
         let mut sink = FrameSink::open(SinkPlan {
             path: &options.output,
             output: self.whole.output.clone(),

@@ -134,7 +134,7 @@ impl<'a> Whole<'a> {
         let names = self.names.as_deref().unwrap_or_default();
         self.views.folder_of(names).add_to(&mut hash);
         if self.output.format() == Some(Format::Exr) {
-            format!("{:?}", ExrLayers::new(&options.layers)).add_to(&mut hash);
+            format!("{:?}", ExrLayers::new(&options.layers, settings.composite)).add_to(&mut hash);
         }
         if let (Some(part), true) = (options.part, is_file) {
             part.add_to(&mut hash);

@@ -120,7 +120,8 @@ fn references_from_outside_are_used_if_they_fit() {
     folder.refuse(&format!("{QUICK} --reference none.png"), "none.png");
     folder.refuse("bench a.toml b.toml --reference ref.png", "one scene");
     folder.refuse("bench none.toml --backends cpu", "none.toml");
-    folder.refuse("bench scene.toml --write-docs scene.toml", "<!-- bench -->");
+    folder.write("page.md", "no section\n");
+    folder.refuse("bench scene.toml --write-docs page.md", "<!-- bench -->");
 }
 
 #[test]

@@ -85,7 +85,7 @@ fn files_of_the_own_folder_keep_their_names() {
     folder.succeed("bundle scene.toml -o bundle");
     assert_eq!(folder.read("bundle/scene.toml"), folder.read("scene.toml"));
     assert!(folder.bytes("bundle/photo.png") == folder.bytes("photo.png"));
-    folder.refuse("bundle scene.toml -o scene.toml", "is there already");
+    folder.refuse("bundle scene.toml -o scene.toml", "is an input of this run");
     folder.write("photo.zip", "a photograph");
     folder.write(
         "odd.toml",

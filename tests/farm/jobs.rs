@@ -13,7 +13,7 @@ const STILL: &str = "[photo]\nimage = \"photo.png\"\n";
 
 fn shot() -> Folder {
     let folder = Folder::with_scene(&format!(
-        "{STILL}{}",
+        "[check]\nallow = [\"floating\"]\n{STILL}{}",
         BALL.replace("pixel = 4", "pixel = 10")
     ));
     folder.frames(7, 0.1);

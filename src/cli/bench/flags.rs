@@ -30,6 +30,7 @@ pub(super) struct OutputFlags {
 impl OutputFlags {
     /// Starts the threads, and opens the page for the table, if there is one.
     pub(super) fn start(&self, section: &'static str) -> Result<Option<Docs>, Failure> {
+        check_folder_name(&self.output, "a folder")?;
         let page = self.write_docs.as_deref();
         let docs = page.map(|path| Docs::open(path, section)).transpose()?;
         self.threads.start()?;
@@ -40,7 +41,6 @@ impl OutputFlags {
     pub(super) fn make_folder(&self, names: &[&str]) -> Result<&Path, Failure> {
         let folder = &self.output;
         files::output(folder)?;
-        check_folder_name(folder, "a folder")?;
         for name in names {
             files::output(&folder.join(name))?;
         }
