@@ -34,15 +34,18 @@ const fn budget(
     }
 }
 
-/// Of variants whose trees are shallow; 16 waves of 32 lanes are the most.
+/// Of all features at once, which no scene has: of any kernel.
+const EVERYTHING: Budget = budget("", 256, 96, 5632, 4);
+
+/// Of variants whose trees are shallow. More registers than these leave room for fewer waves.
 const BUDGETS: [Budget; 7] = [
     budget("kernel_generate", 96, 0, 512, 10),
     budget("kernel_turn", 16, 0, 0, 16),
-    budget("kernel_trace", 112, 0, 5632, 8),
-    budget("kernel_advance", 256, 64, 512, 4),
+    budget("kernel_trace", 96, 0, 5632, 10),
+    budget("kernel_advance", 256, 24, 512, 4),
     budget("kernel_accumulate", 96, 0, 512, 10),
     budget("kernel_share", 128, 0, 5632, 8),
-    budget("kernel_photons", 256, 64, 5632, 4),
+    budget("kernel_photons", 256, 0, 5632, 4),
 ];
 
 /// What of a row of gpu-code.json is not as it should be.
@@ -53,8 +56,12 @@ fn faults(row: &Value) -> Vec<String> {
             .unwrap_or_else(|| panic!("{name} of {row}"))
     };
     let kernel = row["kernel"].as_str().expect("a name");
-    let budget = (BUDGETS.iter().find(|budget| budget.kernel == kernel))
+    let own = (BUDGETS.iter().find(|budget| budget.kernel == kernel))
         .unwrap_or_else(|| panic!("{kernel} has no budget"));
+    let has_everything = row["variant"]
+        .as_str()
+        .is_some_and(|v| v.starts_with("everything"));
+    let budget = if has_everything { &EVERYTHING } else { own };
     let mut faults = Vec::new();
     for (name, most) in [
         ("scratch_bytes", 0),
