@@ -66,7 +66,8 @@ fn instance() -> wgpu::Instance {
 }
 
 fn adapters() -> Vec<wgpu::Adapter> {
-    pollster::block_on(instance().enumerate_adapters(wgpu::Backends::all()))
+    // With the window OpenGL is built in too, whose kernels may bind fewer buffers than ours need.
+    pollster::block_on(instance().enumerate_adapters(wgpu::Backends::PRIMARY))
 }
 
 fn is_hardware(kind: wgpu::DeviceType) -> bool {

@@ -96,7 +96,15 @@ fn exr_layers() {
     assert_eq!(
         usual,
         [
-            "", "change", "depth", "mask", "normal", "samples", "variance", "virtual"
+            "",
+            "change",
+            "depth",
+            "difference",
+            "mask",
+            "normal",
+            "samples",
+            "variance",
+            "virtual"
         ]
     );
     folder.succeed("render scene.toml -o out.png --stats s.json");
