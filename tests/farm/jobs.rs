@@ -118,7 +118,11 @@ fn frames_for_open_job_description() {
     );
     let words = filled(&folder, &steps[0], "0-2");
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
-    folder.refuse(&words, "another render");
+    // The engine reads its lines from standard output.
+    let refused = folder.run(&words);
+    assert_eq!(refused.status.code(), Some(2));
+    let message = stderr(&refused);
+    assert!(message.contains("another render"), "{message}");
 }
 
 #[test]
