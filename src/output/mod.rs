@@ -29,13 +29,12 @@ pub use plain::{write_composite, write_image};
 pub(crate) use png_file::{PNG_END, picture_codes8};
 pub use png_file::{PngBits, write_png};
 pub use reference_file::write_reference;
-pub(crate) use target::check_writable_as;
-#[cfg(feature = "cli")]
-pub(crate) use target::new_beside;
 #[cfg(feature = "bench")]
 pub(crate) use target::quick;
 pub use target::{Format, Target, write_bytes, write_text};
 pub(crate) use target::{check_named, check_writable, sync_folder};
+#[cfg(feature = "cli")]
+pub(crate) use target::{check_writable_as, new_beside};
 pub(crate) use temporary::{cut, remove_leftovers};
 
 use std::path::PathBuf;

@@ -281,6 +281,7 @@ impl<R: Read> Y4mReader<R> {
     ///
     /// # Errors
     /// As [`Self::next_frame`], and where the frame is not whole.
+    #[cfg(feature = "track")]
     pub(crate) fn next_at_once(&mut self) -> Result<Option<Vec<u8>>, VideoError> {
         if !self.begin_frame()? {
             return Ok(None);
