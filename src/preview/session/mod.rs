@@ -74,6 +74,8 @@ pub struct Session {
     /// Unsaved work of a run that ended without a word.
     recovered: Option<String>,
     autosaved: Option<(Edited, Instant)>,
+    /// Writes it.
+    autosaving: Option<thread::JoinHandle<()>>,
     still: Option<Still>,
 }
 
@@ -106,6 +108,7 @@ impl Session {
             has_conflict: false,
             recovered: None,
             autosaved: None,
+            autosaving: None,
             still: None,
         };
         session.recovered = std::fs::read_to_string(session.autosave_path()).ok();

@@ -23,7 +23,8 @@ impl Session {
 
     /// Writes what is new, now and then.
     pub(super) fn autosave(&mut self, now: Instant) {
-        if !self.is_dirty() || self.recovered.is_some() {
+        let is_writing = (self.autosaving.as_ref()).is_some_and(|writing| !writing.is_finished());
+        if !self.is_dirty() || self.recovered.is_some() || is_writing {
             return;
         }
         let Some(present) = self.present.clone() else {
@@ -36,14 +37,18 @@ impl Session {
             self.autosaved = Some((present, now));
             let path = self.autosave_path();
             // Written beside the window, as a disk may take its time; where it cannot be written there is nothing to recover.
-            thread::spawn(move || {
+            self.autosaving = Some(thread::spawn(move || {
                 let _ = write_text(&path, &text);
-            });
+            }));
         }
     }
 
     /// Forgets the work that was not saved, this run's and what an earlier one left.
     pub fn discard_autosave(&mut self) {
+        // What is still being written would be there again afterwards.
+        if let Some(writing) = self.autosaving.take() {
+            let _ = writing.join();
+        }
         if self.autosaved.take().is_some() || self.recovered.take().is_some() {
             // It may never have been written.
             let _ = std::fs::remove_file(self.autosave_path());
