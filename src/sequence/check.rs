@@ -8,13 +8,13 @@ use bytemuck::Zeroable;
 use glam::DVec3;
 
 use super::plan::{Files, known_rate, views};
+use super::table::{frame_key, read_table};
 use super::{Event, SequenceError, SequenceOptions};
 use crate::camera::lens::camera_project;
-use crate::decode::{MAX_TEXT_BYTES, read_text};
 use crate::pack::camera::frame_camera;
 use crate::packed::Frame;
 use crate::scene::projection::project;
-use crate::scene::trajectory::{EntryKey, Focal, FrameName, KnownPoint};
+use crate::scene::trajectory::{Focal, FrameName, KnownPoint};
 use crate::scene::{Camera, Lens};
 use crate::video::FrameSource;
 
@@ -178,31 +178,11 @@ fn table(errors: &BTreeMap<String, Errors>, used: u64, without_pose: u64, behind
 
 /// `frame,x_px,y_px,x_m,y_m,z_m` a line; `frame` is a number or a file name, the pixel may be empty.
 fn read_points(path: &Path) -> Result<Vec<KnownPoint>, SequenceError> {
-    let failure = |line: usize, problem: String| {
+    let failure = |line: u64, problem: String| {
         SequenceError::Unfit(format!("{}:{line}: {problem}", path.display()))
     };
-    let text = read_text(path, MAX_TEXT_BYTES).map_err(|reason| {
-        SequenceError::Unfit(format!(
-            "{}: it cannot be read ({reason}); expected a table of points; correct the path",
-            path.display()
-        ))
-    })?;
     let mut points = Vec::new();
-    let mut table = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    for (index, record) in table.records().enumerate() {
-        let record = record.map_err(|error| failure(index + 1, error.to_string()))?;
-        let line = record
-            .position()
-            .map_or(0, |position| position.line() as usize);
-        let words: Vec<&str> = record.iter().collect();
-        if words == [""] || (index == 0 && words[0] == "frame") {
-            continue;
-        }
+    for (line, words) in read_table(path, "points", "frame", &failure)? {
         let [frame, x_px, y_px, x, y, z] = words.as_slice() else {
             return Err(failure(
                 line,
@@ -234,10 +214,7 @@ fn read_points(path: &Path) -> Result<Vec<KnownPoint>, SequenceError> {
             _ => Some([number(x_px)?, number(y_px)?]),
         };
         points.push(KnownPoint {
-            key: match frame.parse() {
-                Ok(number) => EntryKey::Number(number),
-                Err(_) => EntryKey::Name((*frame).to_owned()),
-            },
+            key: frame_key(frame),
             place: format!("line {line}"),
             world: DVec3::new(number(x)?, number(y)?, number(z)?),
             seen,

@@ -22,6 +22,7 @@ mod plan;
 mod report;
 mod scale;
 mod survey;
+mod table;
 mod whole;
 
 use std::path::PathBuf;

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::SequenceError;
-use crate::decode::{MAX_TEXT_BYTES, read_text};
+use super::table::{frame_key, read_table};
 use crate::distortion::undistort;
 use crate::scene::trajectory::{EntryKey, FrameName, FrameView, Intrinsics, Views};
 
@@ -51,26 +51,8 @@ pub fn read_clicks(path: &std::path::Path) -> Result<Vec<Sighting>, SequenceErro
             path.display()
         ))
     };
-    let text = read_text(path, MAX_TEXT_BYTES).map_err(|reason| {
-        SequenceError::Unfit(format!(
-            "{}: it cannot be read ({reason}); expected a table of clicks; correct the path",
-            path.display()
-        ))
-    })?;
     let mut sightings = Vec::new();
-    let mut table = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    for (index, record) in table.records().enumerate() {
-        let record = record.map_err(|error| failure(index as u64 + 1, error.to_string()))?;
-        let line = record.position().map_or(0, |position| position.line());
-        let words: Vec<&str> = record.iter().collect();
-        if words == [""] || (index == 0 && words[0] == "point") {
-            continue;
-        }
+    for (line, words) in read_table(path, "clicks", "point", &failure)? {
         let [point, frame, x, y] = words.as_slice() else {
             return Err(failure(line, format!("it has {} columns", words.len())));
         };
@@ -79,11 +61,8 @@ pub fn read_clicks(path: &std::path::Path) -> Result<Vec<Sighting>, SequenceErro
             _ => Err(failure(line, format!("{word:?} is no pixel"))),
         };
         sightings.push(Sighting {
-            point: (*point).to_owned(),
-            frame: match frame.parse() {
-                Ok(number) => EntryKey::Number(number),
-                Err(_) => EntryKey::Name((*frame).to_owned()),
-            },
+            point: point.clone(),
+            frame: frame_key(frame),
             pixel: DVec2::new(number(x)?, number(y)?),
         });
     }
