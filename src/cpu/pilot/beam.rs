@@ -6,14 +6,14 @@ use crate::camera::lens::{camera_ray_from, is_wide, lens_undistort};
 use crate::camera::shutter::{CameraPose, camera_pose, camera_pose_at};
 use crate::packed::{FRAME_SHUTTER, Frame, PackedScene, SHUTTER_POSES};
 
-/// All rays of one pixel: at axis depth z they lie within `radius(z)` of the pinhole ray through the pixel's centre.
+/// All rays of a pixel, or of a square of pixels: at axis depth z they lie within `radius(z)` of the pinhole ray through its centre.
 pub struct Beam {
     pub origin: Vec3,
     /// Unit.
     pub direction: Vec3,
     /// View axis, unit.
     axis: Vec3,
-    /// Pixel footprint at axis depth 1, metres.
+    /// Of the square at axis depth 1, metres.
     footprint: f32,
     aperture_radius: f32,
     inv_focus_distance: f32,
@@ -63,17 +63,23 @@ impl RowPoses {
 
 impl Beam {
     pub fn of_pixel(frame: &Frame, pinhole: &Frame, pixel: u32) -> Self {
+        Self::of_square(frame, pinhole, pixel, 1)
+    }
+
+    /// Of the pixels of a square, the first of which is `pixel`; of more than one while the camera rests.
+    pub fn of_square(frame: &Frame, pinhole: &Frame, pixel: u32, side_px: u32) -> Self {
+        let side = side_px as f32;
         let (row, column) = (pixel / frame.width, pixel % frame.width);
         let (x, y) = (column as f32, row as f32);
         let poses = RowPoses::of(frame, row);
         let middle = poses.all[0];
         let axis = -middle.back;
-        let centre = camera_ray_from(pinhole, &middle, x + 0.5, y + 0.5, 0.5, 0.5);
+        let centre = camera_ray_from(pinhole, &middle, x + 0.5 * side, y + 0.5 * side, 0.5, 0.5);
         let at_depth_1 = |d: Vec3| d / d.dot(axis).max(1e-6);
         let ahead = at_depth_1(centre.direction);
         let [fx, fy, cx, cy] = frame.intrinsics;
         // The distortion is the same wherever the camera is.
-        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+        let corners = [(0.0, 0.0), (side, 0.0), (0.0, side), (side, side)]
             .map(|(dx, dy)| lens_undistort(frame, (x + dx - cx) / fx, (y + dy - cy) / fy));
         let (mut footprint, mut shake) = (0.0f32, 0.0f32);
         for pose in &poses.all[..poses.count] {
@@ -91,7 +97,7 @@ impl Beam {
             let mut half_angle = 0.0f32;
             for pose in &poses.all[..poses.count] {
                 shake = shake.max(pose.position.distance(middle.position));
-                for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+                for (dx, dy) in [(0.0, 0.0), (side, 0.0), (0.0, side), (side, side)] {
                     let ray = camera_ray_from(pinhole, pose, x + dx, y + dy, 0.5, 0.5);
                     half_angle = half_angle.max(angle_between(ray.direction, centre.direction));
                 }

@@ -1,7 +1,7 @@
 //! The picture in square blocks of pixels, the pilot's resolution.
 
 /// Pixels along a block's side.
-const SIDE_PX: usize = 4;
+pub const SIDE_PX: usize = 4;
 
 pub struct Blocks {
     width: usize,

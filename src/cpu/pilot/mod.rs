@@ -20,7 +20,7 @@ use super::photons::guide::learn;
 use super::photons::plan::{EyeMoments, photons_per_ray, unmeasured};
 use allocation::{Rates, allocate};
 use beam::Beam;
-use blocks::Blocks;
+use blocks::{Blocks, SIDE_PX};
 #[cfg(feature = "bench")]
 pub(crate) use importance::MAX_LIGHTS_EXAMINED;
 use importance::{PilotLights, importance};
@@ -29,8 +29,8 @@ use measurement::Moments;
 use crate::cpu::sharing::BLOCK_SIDE;
 use crate::packed::{
     ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_GUIDE, FRAME_NO_SHARING,
-    Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PIXEL_SHARES, PIXEL_SHARES_NEAR,
-    PackedScene, PixelInfo, SIDE_VIRTUAL,
+    FRAME_SHUTTER, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PIXEL_SHARES,
+    PIXEL_SHARES_NEAR, PackedScene, PixelInfo, SIDE_VIRTUAL,
 };
 use crate::work::Meter;
 
@@ -48,8 +48,9 @@ pub fn pilot_steps(frame: &Frame) -> u64 {
     (width * height) as u64 + STEPS_OF_A_BLOCK * Blocks::of(width, height).count() as u64
 }
 
-/// Fills `scene.pixels`. The same for every seed, sample range and backend.
-pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
+/// Fills `scene.pixels`. The same for every seed, sample range and backend. `draft`: beams are those of whole blocks, which costs a few more rays
+/// beside virtual objects and saves most of the time.
+pub fn pilot(scene: &mut PackedScene, draft: bool, meter: &Meter<'_>) {
     let (width, height) = (scene.frame.width as usize, scene.frame.height as usize);
     let nothing_virtual = scene.frame.sphere_count == 0
         && scene.swept_spheres.is_empty()
@@ -65,15 +66,21 @@ pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
         aperture_radius: 0.0,
         ..scene.frame
     };
-    let flags: Vec<u32> = (0..width * height)
-        .into_par_iter()
-        .map(|i| {
-            if i % width == 0 {
-                meter.add(width as u64);
-            }
-            flags_of(scene, &Beam::of_pixel(&scene.frame, &pinhole, i as u32))
-        })
-        .collect();
+    let blocks = Blocks::of(width, height);
+    // Each row of a moving camera has beams of its own.
+    let flags = if draft && scene.frame.flags & FRAME_SHUTTER == 0 {
+        flags_by_block(scene, &pinhole, &blocks)
+    } else {
+        (0..width * height)
+            .into_par_iter()
+            .map(|i| {
+                if i % width == 0 {
+                    meter.add(width as u64);
+                }
+                flags_of(scene, &Beam::of_pixel(&scene.frame, &pinhole, i as u32))
+            })
+            .collect()
+    };
     if photons_traced(&scene.frame) {
         scene.photons_per_ray = unmeasured(width * height);
     }
@@ -81,7 +88,6 @@ pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
         scene.pixels = flags.into_iter().map(PixelInfo::uniform).collect();
         return;
     }
-    let blocks = Blocks::of(width, height);
     let lights = PilotLights::of(scene);
     let importances: Vec<f32> = (0..blocks.count())
         .into_par_iter()
@@ -141,6 +147,20 @@ fn share(pixels: &mut [PixelInfo], blocks: &Blocks, rates: &[Rates]) {
 /// Whether pixels may share second vertices: what is between a vertex and a point must be certain, and equal for all rows.
 fn sharing_allowed(scene: &PackedScene) -> bool {
     scene.frame.flags & (FRAME_ALPHA | FRAME_NO_SHARING) == 0 && scene.swept_spheres.is_empty()
+}
+
+/// By pixel.
+fn flags_by_block(scene: &PackedScene, pinhole: &Frame, blocks: &Blocks) -> Vec<u32> {
+    let flags: Vec<u32> = (0..blocks.count())
+        .into_par_iter()
+        .map(|block| {
+            let corner = blocks.first_pixel(block) as u32;
+            let beam = Beam::of_square(&scene.frame, pinhole, corner, SIDE_PX as u32);
+            flags_of(scene, &beam)
+        })
+        .collect();
+    let pixels = 0..scene.pixels.len();
+    pixels.map(|pixel| flags[blocks.of_pixel(pixel)]).collect()
 }
 
 fn flags_of(scene: &PackedScene, beam: &Beam) -> u32 {
