@@ -19,4 +19,4 @@ pub mod vertex;
 
 pub use backdrop::backdrop_share;
 pub use pilot::{LensGrid, pilot, pilot_steps};
-pub use surfaces::diffuse_surfaces;
+pub use surfaces::{diffuse_surfaces, diffuse_surfaces_of_pinhole};

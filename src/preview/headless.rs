@@ -22,6 +22,8 @@ use crate::stages::finish;
 
 /// Nothing that is waited for takes longer.
 const PATIENCE: Duration = Duration::from_secs(600);
+/// Between two frames while something is waited for, as on a screen: drawing more often would take the processors from what renders.
+const FRAME: Duration = Duration::from_millis(16);
 const SIZE: [f32; 2] = [1240.0, 760.0];
 
 /// A step that failed.
@@ -101,7 +103,7 @@ impl Window {
             if Instant::now() > end {
                 return Err(format!("{what} took longer than {} s", PATIENCE.as_secs()));
             }
-            sleep(Duration::from_millis(1));
+            sleep(FRAME);
         }
     }
 
@@ -384,25 +386,46 @@ impl Window {
         }
         let longest_ms = 1e3 * self.app().longest_frame.as_secs_f64();
         let latencies = self.session().renderers().latencies();
-        let mut table =
-            String::from("| edit | edits | median, ms | p95, ms |\n| --- | --- | --- | --- |\n");
+        let mut table = String::from(
+            "| edit | edits | median, ms | p95, ms | of the processors, median, ms |\n| --- | --- | --- | --- | --- |\n",
+        );
         for change in ["lens", "light", "object", "exposure or bounces"] {
-            let mut times: Vec<f64> = (latencies.iter())
-                .filter(|latency| latency.change == change && latency.level == Level::Coarse)
-                .map(|latency| 1e3 * latency.time.as_secs_f64())
-                .collect();
-            times.sort_by(f64::total_cmp);
-            if let Some(last) = times.len().checked_sub(1) {
-                let at = |share: f64| times[(last as f64 * share).round() as usize];
+            let of_change = || {
+                let all = latencies.iter();
+                all.filter(|latency| latency.change == change && latency.level == Level::Coarse)
+            };
+            let times = Spread::of(of_change().map(|latency| latency.time));
+            let processors = Spread::of(of_change().map(|latency| latency.processor_time));
+            if let (Some(times), Some(processors)) = (times, processors) {
                 table += &format!(
-                    "| {change} | {} | {:.0} | {:.0} |\n",
-                    times.len(),
-                    at(0.5),
-                    at(0.95)
+                    "| {change} | {} | {:.0} | {:.0} | {:.0} |\n",
+                    times.count, times.median_ms, times.p95_ms, processors.median_ms
                 );
             }
         }
         Ok(table + &format!("\nlongest frame of the window: {longest_ms:.0} ms\n"))
+    }
+}
+
+/// Of some times.
+struct Spread {
+    count: usize,
+    median_ms: f64,
+    p95_ms: f64,
+}
+
+impl Spread {
+    /// `None` of none.
+    fn of(times: impl Iterator<Item = Duration>) -> Option<Self> {
+        let mut ms: Vec<f64> = times.map(|time| 1e3 * time.as_secs_f64()).collect();
+        ms.sort_by(f64::total_cmp);
+        let last = ms.len().checked_sub(1)?;
+        let at = |share: f64| ms[(last as f64 * share).round() as usize];
+        Some(Self {
+            count: ms.len(),
+            median_ms: at(0.5),
+            p95_ms: at(0.95),
+        })
     }
 }
 

@@ -38,6 +38,7 @@ impl Renderer {
         let stopwatch = Stopwatch::start();
         let look_ahead = self.core.seconds.look_ahead;
         if real_light_changed {
+            self.surfaces.clear();
             self.prepare_photo(watcher);
         }
         let swept = self.prepare_shutter(watcher)?;
@@ -100,7 +101,13 @@ impl Renderer {
             }
         }
         if from_photo {
-            let limited = photo_albedo::estimate_photo_albedo(&mut core.packed, photo, watcher);
+            let kept = (core.photo_light.as_ref()).filter(|_| core.options.draft);
+            if kept.is_some_and(|light| light.take_up(&mut core.packed, photo)) {
+                return;
+            }
+            let (light, limited) =
+                photo_albedo::estimate_photo_albedo(&mut core.packed, photo, watcher);
+            core.photo_light = core.options.draft.then_some(light);
             let is_additive = core.scene.settings.composite == Composite::Additive;
             if limited > MOSTLY && is_additive {
                 let albedo = std::mem::take(&mut core.packed.photo_albedo);
@@ -176,8 +183,14 @@ impl Renderer {
         let grouped = core.options.keeps_groups(core.scene.settings.combine);
         core.film.set_groups(grouped);
         core.film.set_photons(core.packed.photons_per_ray > 0);
-        if core.options.filter.is_some() {
-            self.surfaces = cpu::diffuse_surfaces(&core.packed);
+        match (core.options.filter, core.options.draft) {
+            (None, _) => {}
+            (Some(_), false) => self.surfaces = cpu::diffuse_surfaces(&core.packed),
+            (Some(_), true) if self.surfaces.is_empty() => {
+                self.surfaces =
+                    cpu::diffuse_surfaces_of_pinhole(&core.packed, core.lens_grid.as_ref());
+            }
+            (Some(_), true) => {}
         }
         core.seconds.look_ahead += stopwatch.secs();
         core.seconds.cpu += stopwatch.cpu_secs();
