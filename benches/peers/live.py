@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """`mixray live` on the marker video, beside the tables of the papers of 2005 and 2006: a minute at 25 frames a second, and what each stage takes.
 
-    python3 benches/peers/live.py [--mixray target/release/mixray] [--data ../shared/data] [--seconds 60] [--threads 1] [--write docs/live.md]
+    python3 benches/peers/live.py [--mixray target/release/mixray] [--data ../shared/data] [--seconds 60] [--frames 24] [--threads 1] [--write docs/live.md]
 
 Wants ffmpeg. A writer hands the frames over at their times; a reader takes what comes out. Then, without a clock, each frame waits for the one
 before. Prints the tables; exits with 1 where a bar is missed.
@@ -9,6 +9,7 @@ before. Prints the tables; exits with 1 where a bar is missed.
 
 import argparse
 import json
+import os
 import pathlib
 import re
 import subprocess
@@ -19,7 +20,6 @@ import time
 
 WIDTH, HEIGHT, RATE = 640, 480, 25
 FRAME_BYTES = len(b"FRAME\n") + WIDTH * HEIGHT * 3 // 2
-STEP_FRAMES = 24
 
 STAGES = {
     "none": "",
@@ -115,7 +115,7 @@ def in_step(arguments, folder, stream, index):
     """One frame after the other, every fifth of the video; seconds by part over all frames, and of processor time after the first."""
     process = begin(arguments, folder, index, "--rpp", "1")
     process.stdin.write(stream.header)
-    for number in range(STEP_FRAMES):
+    for number in range(arguments.frames):
         process.stdin.write(stream.frame(100 + 5 * number))
         process.stdin.flush()
         if number == 0:
@@ -127,12 +127,13 @@ def in_step(arguments, folder, stream, index):
     process.stdin.close()
     if process.wait() != 0:
         sys.exit("mixray live failed")
-    return json.loads((folder / "stats.json").read_text())["seconds"], used / (STEP_FRAMES - 1)
+    return json.loads((folder / "stats.json").read_text())["seconds"], used / (arguments.frames - 1)
 
 
 def measure(arguments, folder):
     stream = prepare(arguments.mixray, arguments.data, folder)
     total, memory = paced(arguments, folder, stream)
+    load = os.getloadavg()[0]
     period_ms = 1e3 / RATE
     frames, age, wait = total["frames"], total["age"], total["wait"]
     bar = total["work_ms"] + 1.5 * period_ms
@@ -140,23 +141,26 @@ def measure(arguments, folder):
     written = frames["rendered"] + frames["held"] + frames["passed_through"]
     lines = [f"| {arguments.seconds} s at {RATE} frames a second | bar | |", "| --- | --- | --- |"]
     lines += [f"| {what} | {limit} | {found} |" for what, limit, found in [
+        ("the machine: cores, and what asks for one", "", f"{os.cpu_count()}, {load:.0f}"),
         ("frames: arrived, written, dropped", "", f"{frames['arrived']}, {written}, {frames['dropped']}"),
         ("work a frame, mean; rays per pixel", "", f"{total['work_ms']:.0f} ms; {total['rays_per_pixel']:.1f}"),
         ("age: median, p95, most", f"p95: work + 1.5 periods, {bar:.0f} ms", f"{age['median_ms']:.0f}, {age['p95_ms']:.0f}, {age['most_ms']:.0f} ms"),
         ("of it waiting: median, p95", f"p95: 1.5 periods, {1.5 * period_ms:.0f} ms", f"{wait['median_ms']:.0f}, {wait['p95_ms']:.0f} ms"),
         (f"memory after {arguments.seconds // 6}, {arguments.seconds // 2}, {arguments.seconds} s", "flat", ", ".join(f"{mib:.0f}" for mib in memory) + " MiB"),
     ]]
-    lines += ["", "| stage, at one ray per pixel | ms of the stage | ms of a frame | processor ms of a frame |", "| --- | --- | --- | --- |"]
+    lines += ["", "| stage, at one ray per pixel | processor ms of a frame | of which the stage |", "| --- | --- | --- |"]
     beside = {}
     for index, name in enumerate(STAGES):
         seconds, used = in_step(arguments, folder, stream, index)
-        parts = {part: 1e3 * secs / STEP_FRAMES for part, secs in seconds.items()}
+        parts = {part: 1e3 * secs / arguments.frames for part, secs in seconds.items()}
         own = {part: parts.pop(part) for part in list(parts) if part not in ("decode", "track", "edit", "render", "composite", "write")}
-        beside = parts if index == 0 else beside
-        stage = sum(own.values())
-        lines.append(f"| {name} | {stage:.1f} | {stage + sum(parts.values()):.0f} | {1e3 * used:.0f} |")
-    of_which = ", ".join(f"{part} {ms:.1f}" for part, ms in beside.items())
-    lines += ["", f"Without stages, ms by part, the first frame with its trees included: {of_which} (composite: with the filter).", *PAPERS.rstrip().split("\n")]
+        stage, others = sum(own.values()), sum(parts.values())
+        # Processor time by the shares of the wall's, which other programs stretch.
+        scale = 1e3 * used / (stage + others)
+        beside = {part: scale * ms for part, ms in parts.items()} if index == 0 else beside
+        lines.append(f"| {name} | {1e3 * used:.0f} | {scale * stage:.0f} |")
+    of_which = ", ".join(f"{part} {ms:.0f}" for part, ms in beside.items())
+    lines += ["", f"Without stages, processor ms by part: {of_which} (composite: with the filter).", *PAPERS.rstrip().split("\n")]
     return "\n".join(lines) + "\n", good
 
 
@@ -166,6 +170,7 @@ def main():
     parser.add_argument("--mixray", type=lambda path: str(pathlib.Path(path).resolve()), default=str(root / "target/release/mixray"))
     parser.add_argument("--data", type=pathlib.Path, default=root / "../shared/data")
     parser.add_argument("--seconds", type=int, default=60)
+    parser.add_argument("--frames", type=int, default=24, help="of each stage")
     parser.add_argument("--threads")
     parser.add_argument("--write", type=pathlib.Path)
     arguments = parser.parse_args()
