@@ -8,7 +8,7 @@ use super::backend::Backend;
 use super::photo_albedo::PhotoLight;
 use super::stopwatch::Stopwatch;
 use super::{RenderError, RendererOptions, Seconds, Skip};
-use crate::cpu;
+use crate::cpu::{self, LensGrid};
 use crate::film::Film;
 use crate::gpu::GpuError;
 use crate::pack::PackError;
@@ -19,6 +19,8 @@ use crate::work::{Meter, Phase, PhotonWork, Progress, RayCounts, Watcher, WorkLi
 pub(super) struct Core {
     pub scene: Scene,
     pub packed: PackedScene,
+    /// Of the frames of a video, and of a scene that is edited.
+    pub lens_grid: Option<LensGrid>,
     pub film: Film,
     pub backend: Backend,
     pub options: RendererOptions,

@@ -223,6 +223,7 @@ impl Renderer {
                 time_secs: scene.shutter.map_or(0.0, |shutter| shutter.time_secs),
                 scene,
                 packed,
+                lens_grid: None,
                 film,
                 backend: Backend::Undecided,
                 options,

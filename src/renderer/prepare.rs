@@ -1,9 +1,10 @@
 //! What precedes the first sample: after the scene is packed, or after an edit.
 
 use super::backend::Backend;
+use super::core::Core;
 use super::stopwatch::Stopwatch;
 use super::{RenderError, Renderer, photo_albedo};
-use crate::cpu;
+use crate::cpu::{self, LensGrid};
 use crate::film::Film;
 use crate::gpu::Changed;
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PackedScene};
@@ -41,6 +42,7 @@ impl Renderer {
             self.prepare_photo(watcher);
         }
         let swept = self.prepare_shutter(watcher)?;
+        self.keep_lens_grid();
         self.look_ahead(watcher);
         let core = &mut self.core;
         let changed = match changed {
@@ -134,6 +136,19 @@ impl Renderer {
         ev
     }
 
+    /// One picture does without; where there is another, more will come.
+    fn keep_lens_grid(&mut self) {
+        let Core {
+            lens_grid, packed, ..
+        } = &mut self.core;
+        if !lens_grid
+            .as_ref()
+            .is_some_and(|grid| grid.fits(&packed.frame))
+        {
+            *lens_grid = Some(LensGrid::of(&packed.frame));
+        }
+    }
+
     /// Runs the pilot and begins the film that follows its plan.
     pub(super) fn look_ahead(&mut self, watcher: &Watcher<'_>) {
         let stopwatch = Stopwatch::start();
@@ -147,7 +162,7 @@ impl Renderer {
         let without = core.options.without;
         without.apply_to_frame(&mut core.packed.frame);
         core.packed.set_backdrop(&core.scene);
-        cpu::pilot(&mut core.packed, core.options.draft, &meter);
+        cpu::pilot(&mut core.packed, core.lens_grid.as_ref(), &meter);
         without.apply_to_pixels(&mut core.packed.pixels);
         let photons = core.packed.photons_per_ray > 0;
         let note = core.packed.black_shadows(photons);

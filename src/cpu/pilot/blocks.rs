@@ -67,12 +67,6 @@ impl Blocks {
         corners.map(|(x, y)| square(x, y)).collect()
     }
 
-    /// The first pixel of a block.
-    pub fn first_pixel(&self, block: usize) -> usize {
-        let (x, y) = self.corner(block);
-        y * self.width + x
-    }
-
     fn corner(&self, block: usize) -> (usize, usize) {
         (
             block % self.columns * SIDE_PX,

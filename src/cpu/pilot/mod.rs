@@ -10,27 +10,33 @@ mod blocks;
 mod highlights;
 mod importance;
 mod measurement;
+mod patch;
 
+use std::borrow::Cow;
 use std::ops::Add;
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::contribution::photons_traced;
 use super::photons::guide::learn;
 use super::photons::plan::{EyeMoments, photons_per_ray, unmeasured};
 use allocation::{Rates, allocate};
-use beam::Beam;
-use blocks::{Blocks, SIDE_PX};
+use beam::{Beam, Sphere};
+use blocks::Blocks;
 #[cfg(feature = "bench")]
 pub(crate) use importance::MAX_LIGHTS_EXAMINED;
 use importance::{PilotLights, importance};
 use measurement::Moments;
+pub use patch::LensGrid;
+use patch::{Certainty, Patch};
 
+use crate::camera::shutter::camera_pose;
 use crate::cpu::sharing::BLOCK_SIDE;
 use crate::packed::{
     ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_GUIDE, FRAME_NO_SHARING,
-    FRAME_SHUTTER, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PIXEL_SHARES,
-    PIXEL_SHARES_NEAR, PackedScene, PixelInfo, SIDE_VIRTUAL,
+    Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PIXEL_SHARES, PIXEL_SHARES_NEAR,
+    PackedScene, PixelInfo, SIDE_VIRTUAL,
 };
 use crate::work::Meter;
 
@@ -48,9 +54,8 @@ pub fn pilot_steps(frame: &Frame) -> u64 {
     (width * height) as u64 + STEPS_OF_A_BLOCK * Blocks::of(width, height).count() as u64
 }
 
-/// Fills `scene.pixels`. The same for every seed, sample range and backend. `draft`: beams are those of whole blocks, which costs a few more rays
-/// beside virtual objects and saves most of the time.
-pub fn pilot(scene: &mut PackedScene, draft: bool, meter: &Meter<'_>) {
+/// Fills `scene.pixels`. The same for every seed, sample range and backend. `grid`: the lens's, where there is one, which spares undistorting.
+pub fn pilot(scene: &mut PackedScene, grid: Option<&LensGrid>, meter: &Meter<'_>) {
     let (width, height) = (scene.frame.width as usize, scene.frame.height as usize);
     let nothing_virtual = scene.frame.sphere_count == 0
         && scene.swept_spheres.is_empty()
@@ -62,25 +67,8 @@ pub fn pilot(scene: &mut PackedScene, draft: bool, meter: &Meter<'_>) {
         scene.pixels = vec![PixelInfo::uniform(PIXEL_OUT_OF_REACH); width * height];
         return;
     }
-    let pinhole = Frame {
-        aperture_radius: 0.0,
-        ..scene.frame
-    };
     let blocks = Blocks::of(width, height);
-    // Each row of a moving camera has beams of its own.
-    let flags = if draft && scene.frame.flags & FRAME_SHUTTER == 0 {
-        flags_by_block(scene, &pinhole, &blocks)
-    } else {
-        (0..width * height)
-            .into_par_iter()
-            .map(|i| {
-                if i % width == 0 {
-                    meter.add(width as u64);
-                }
-                flags_of(scene, &Beam::of_pixel(&scene.frame, &pinhole, i as u32))
-            })
-            .collect()
-    };
+    let (flags, importances) = look(scene, grid, &blocks, meter);
     if photons_traced(&scene.frame) {
         scene.photons_per_ray = unmeasured(width * height);
     }
@@ -88,18 +76,6 @@ pub fn pilot(scene: &mut PackedScene, draft: bool, meter: &Meter<'_>) {
         scene.pixels = flags.into_iter().map(PixelInfo::uniform).collect();
         return;
     }
-    let lights = PilotLights::of(scene);
-    let importances: Vec<f32> = (0..blocks.count())
-        .into_par_iter()
-        .map(|block| {
-            let pixel = blocks.first_pixel(block) as u32;
-            importance(
-                scene,
-                &Beam::of_pixel(&scene.frame, &pinhole, pixel),
-                &lights,
-            )
-        })
-        .collect();
     // A lens beam must not jump off the map at an edge.
     let importances: Vec<f32> = (0..blocks.count())
         .map(|block| blocks.gather(&importances, block, 1, 0.0, f32::max))
@@ -149,27 +125,116 @@ fn sharing_allowed(scene: &PackedScene) -> bool {
     scene.frame.flags & (FRAME_ALPHA | FRAME_NO_SHARING) == 0 && scene.swept_spheres.is_empty()
 }
 
-/// By pixel.
-fn flags_by_block(scene: &PackedScene, pinhole: &Frame, blocks: &Blocks) -> Vec<u32> {
-    let flags: Vec<u32> = (0..blocks.count())
-        .into_par_iter()
-        .map(|block| {
-            let corner = blocks.first_pixel(block) as u32;
-            let beam = Beam::of_square(&scene.frame, pinhole, corner, SIDE_PX as u32);
-            flags_of(scene, &beam)
-        })
-        .collect();
-    let pixels = 0..scene.pixels.len();
-    pixels.map(|pixel| flags[blocks.of_pixel(pixel)]).collect()
+/// What a patch's pixels and its blocks are found to be.
+struct PatchFindings {
+    flags: Vec<(usize, u32)>,
+    importances: Vec<(usize, f32)>,
 }
 
-fn flags_of(scene: &PackedScene, beam: &Beam) -> u32 {
-    if beam.may_meet_virtual(scene) {
-        PIXEL_BEAM_MAY_MEET_VIRTUAL
-    } else if beam.may_meet_real(scene) {
-        0
-    } else {
-        PIXEL_OUT_OF_REACH
+/// Each pixel's flags, and each block's importance.
+fn look(
+    scene: &PackedScene,
+    grid: Option<&LensGrid>,
+    blocks: &Blocks,
+    meter: &Meter<'_>,
+) -> (Vec<u32>, Vec<f32>) {
+    let frame = &scene.frame;
+    let pinhole = Frame {
+        aperture_radius: 0.0,
+        ..*frame
+    };
+    let spheres = WorldSpheres::of(scene);
+    let weighs = frame.estimator != ESTIMATOR_PAPER;
+    let lights = weighs.then(|| PilotLights::of(scene));
+    let findings: Vec<PatchFindings> = (0..Patch::count(frame))
+        .into_par_iter()
+        .map(|index| {
+            let patch = match grid {
+                Some(grid) => Cow::Borrowed(&grid.patches[index]),
+                None => Cow::Owned(Patch::of(frame, &pinhole, index)),
+            };
+            let flags = spheres.flags(frame, &patch);
+            meter.add(flags.len() as u64);
+            let importances = lights.iter().flat_map(|lights| {
+                let firsts = patch.firsts(frame, blocks::SIDE_PX);
+                firsts.map(|(at, pixel)| {
+                    let found = match flags[at].1 {
+                        // Nor does its ray meet anything real.
+                        PIXEL_OUT_OF_REACH => 0.0,
+                        _ => importance(scene, &Beam::of_pixel(frame, &patch, at), lights),
+                    };
+                    (blocks.of_pixel(pixel), found)
+                })
+            });
+            PatchFindings {
+                importances: importances.collect(),
+                flags,
+            }
+        })
+        .collect();
+    let mut flags = vec![0; scene.frame.width as usize * scene.frame.height as usize];
+    let mut importances = vec![0.0; blocks.count()];
+    for patch in findings {
+        for (pixel, found) in patch.flags {
+            flags[pixel] = found;
+        }
+        for (block, found) in patch.importances {
+            importances[block] = found;
+        }
+    }
+    (flags, importances)
+}
+
+/// What holds the virtual and the real world.
+struct WorldSpheres {
+    virtual_: Vec<Sphere>,
+    real: Vec<Sphere>,
+}
+
+impl WorldSpheres {
+    fn of(scene: &PackedScene) -> Self {
+        let virtual_ = match scene.swept_spheres.as_slice() {
+            [] => &scene.frame.spheres[..scene.frame.sphere_count as usize],
+            swept => swept,
+        };
+        let real = scene.real_bvh.bounds();
+        Self {
+            virtual_: (virtual_.iter())
+                .map(|s| (Vec3::new(s[0], s[1], s[2]), s[3]))
+                .collect(),
+            real: (real.iter())
+                .map(|&(lo, hi)| ((lo + hi) * 0.5, (hi - lo).length() * 0.5))
+                .collect(),
+        }
+    }
+
+    /// Of each pixel of a patch, with its number in the picture.
+    fn flags(&self, frame: &Frame, patch: &Patch) -> Vec<(usize, u32)> {
+        let pose = camera_pose(frame);
+        let of_all = |spheres: &[Sphere]| {
+            let each = spheres.iter();
+            let each = each.map(|&sphere| patch.meets_sphere(frame, &pose, sphere));
+            each.fold(Certainty::Never, Certainty::or)
+        };
+        let (near, real) = (of_all(&self.virtual_), of_all(&self.real));
+        let each = patch.pixels(frame).enumerate();
+        each.map(|(at, pixel)| {
+            let asked = (near == Certainty::Open
+                || near == Certainty::Never && real == Certainty::Open)
+                .then(|| Beam::of_pixel(frame, patch, at));
+            let meets = |certainty: Certainty, spheres: &[Sphere]| match certainty {
+                Certainty::Never => false,
+                Certainty::Always => true,
+                Certainty::Open => asked.as_ref().is_some_and(|b| b.may_meet_any(spheres)),
+            };
+            let flags = match meets(near, &self.virtual_) {
+                true => PIXEL_BEAM_MAY_MEET_VIRTUAL,
+                false if meets(real, &self.real) => 0,
+                false => PIXEL_OUT_OF_REACH,
+            };
+            (pixel, flags)
+        })
+        .collect()
     }
 }
 
