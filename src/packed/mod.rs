@@ -56,9 +56,11 @@ pub struct PackedScene {
     pub(crate) real_vertex_count: usize,
     pub(crate) resting: Resting,
     /// Over the virtual triangles that rest.
-    pub(crate) resting_cover: Cover,
+    pub(crate) resting_covers: Vec<Cover>,
     /// Over those of them that are smooth.
-    pub(crate) resting_smooth_cover: Cover,
+    pub(crate) resting_smooth_covers: Vec<Cover>,
+    /// Of a draft: the virtual objects' that were found so far.
+    pub(crate) object_covers: Option<Vec<ObjectCover>>,
     pub(crate) env_mean_luminance: f64,
     pub(crate) env_traced: TracedEnvironment,
     /// Photons traced for every ray per pixel; 0 where none are.
@@ -72,6 +74,17 @@ pub struct TracedEnvironment {
     pub above: f64,
     /// Luminance of what lies above it, mean over the sphere.
     pub mean_radiance: f64,
+}
+
+/// Spheres about a virtual object, in its own space.
+pub(crate) struct ObjectCover {
+    /// Index in the scene.
+    pub object: usize,
+    /// Of its triangles that rest.
+    pub triangles: usize,
+    pub whole: Cover,
+    /// About what of it is smooth.
+    pub smooth: Cover,
 }
 
 /// How many of a scene's triangles and vertices rest: those of animated virtual objects come after them.
@@ -109,8 +122,9 @@ impl PackedScene {
             material_table: materials::MaterialTable::default(),
             real_vertex_count: 0,
             resting: Resting::default(),
-            resting_cover: Cover::of(&[], MAX_SPHERES),
-            resting_smooth_cover: Cover::of(&[], MAX_PHOTON_SPHERES),
+            resting_covers: Vec::new(),
+            resting_smooth_covers: Vec::new(),
+            object_covers: None,
             env_mean_luminance: 0.0,
             env_traced: TracedEnvironment::default(),
             photons_per_ray: 0,
