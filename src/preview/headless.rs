@@ -1,6 +1,6 @@
 //! Runs a script on the window's own code, without a display.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -384,11 +384,23 @@ impl Window {
                 self.wait_for_coarse()?;
             }
         }
+        let added = self.measure_files(&["glb", "gltf"], true)?;
+        let swapped = self.measure_files(&["png", "jpg", "jpeg", "webp"], false)?;
         let longest_ms = 1e3 * self.app().longest_frame.as_secs_f64();
         let latencies = self.session().renderers().latencies();
         let mut table = String::from(
             "| edit | edits | median, ms | p95, ms | of the processors, median, ms |\n| --- | --- | --- | --- | --- |\n",
         );
+        let mut row = |name: &str, times: Option<Spread>, processors: Option<Spread>| {
+            if let Some(times) = times {
+                let processors =
+                    processors.map_or("".to_owned(), |p| format!("{:.0}", p.median_ms));
+                table += &format!(
+                    "| {name} | {} | {:.0} | {:.0} | {processors} |\n",
+                    times.count, times.median_ms, times.p95_ms
+                );
+            }
+        };
         for change in ["lens", "light", "object", "exposure or bounces"] {
             let of_change = || {
                 let all = latencies.iter();
@@ -396,14 +408,44 @@ impl Window {
             };
             let times = Spread::of(of_change().map(|latency| latency.time));
             let processors = Spread::of(of_change().map(|latency| latency.processor_time));
-            if let (Some(times), Some(processors)) = (times, processors) {
-                table += &format!(
-                    "| {change} | {} | {:.0} | {:.0} | {:.0} |\n",
-                    times.count, times.median_ms, times.p95_ms, processors.median_ms
-                );
+            row(change, times, processors);
+        }
+        row("object added", Spread::of(added.into_iter()), None);
+        row("photograph swapped", Spread::of(swapped.into_iter()), None);
+        let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+        let load = load.split(' ').next().unwrap_or_default();
+        Ok(table
+            + &format!(
+                "\nlongest frame of the window: {longest_ms:.0} ms; load of the machine: {load}\n"
+            ))
+    }
+
+    /// From files that are dropped, one of the scene's own with such an ending, to the pictures that show them first; `undone`: each is taken out
+    /// again.
+    fn measure_files(&mut self, endings: &[&str], undone: bool) -> Result<Vec<Duration>, String> {
+        const FILES: usize = 5;
+        let loaded = self.session().loaded().ok_or("no scene is read")?;
+        let has_ending = |file: &&PathBuf| {
+            let ending = file.extension().map(|e| e.to_string_lossy().to_lowercase());
+            ending.is_some_and(|ending| endings.contains(&&*ending))
+        };
+        let Some(file) = loaded.scene.inputs.iter().find(has_ending).cloned() else {
+            return Ok(Vec::new());
+        };
+        let mut times = Vec::new();
+        for _ in 0..FILES {
+            let begin = Instant::now();
+            self.session_mut().take_file(&file, None);
+            self.wait_for_scene()?;
+            self.wait_for_coarse()?;
+            times.push(begin.elapsed());
+            if undone {
+                self.session_mut().undo();
+                self.wait_for_scene()?;
+                self.wait_for_coarse()?;
             }
         }
-        Ok(table + &format!("\nlongest frame of the window: {longest_ms:.0} ms\n"))
+        Ok(times)
     }
 }
 
