@@ -65,8 +65,13 @@ pub mod files;
 pub mod film;
 #[doc(hidden)]
 pub mod gpu;
+#[cfg(feature = "track")]
+mod least_squares;
 #[doc(hidden)]
 pub mod light;
+#[cfg(feature = "start")]
+#[doc(hidden)]
+pub mod light_fit;
 #[cfg(feature = "track")]
 #[doc(hidden)]
 pub mod live;

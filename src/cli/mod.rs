@@ -18,6 +18,8 @@ mod goal_flags;
 mod info;
 mod interrupt;
 mod layers;
+#[cfg(feature = "start")]
+mod light;
 #[cfg(feature = "track")]
 mod live;
 mod merge;
@@ -78,6 +80,8 @@ enum Command {
     Track(Box<track::Arguments>),
     #[cfg(feature = "start")]
     New(Box<new::Arguments>),
+    #[cfg(feature = "start")]
+    Light(light::Arguments),
     #[cfg(feature = "track")]
     Live(Box<live::Arguments>),
     Merge(merge::Arguments),
@@ -159,6 +163,8 @@ fn run_command() -> ExitCode {
         Command::Track(arguments) => track::run(&arguments),
         #[cfg(feature = "start")]
         Command::New(arguments) => new::run(&arguments),
+        #[cfg(feature = "start")]
+        Command::Light(arguments) => all_threads().and_then(|()| light::run(&arguments)),
         #[cfg(feature = "track")]
         Command::Live(arguments) => live::run(&arguments),
         Command::Merge(arguments) => all_threads().and_then(|()| merge::run(&arguments)),

@@ -5,9 +5,9 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Dyn, Matrix6, OMatrix, U6, Vector6};
 
 use super::frame_pose::{Observation, project, robust};
-use super::least_squares::{Descending, Descent};
 use super::lens::{LENS_PARAMETERS, Lens};
 use super::pose::Pose;
+use crate::least_squares::{Descending, Descent};
 
 /// A frame and what is seen in it.
 #[derive(Clone, Debug)]

@@ -4,9 +4,9 @@ use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{Matrix3, Matrix6, Vector6};
 
 use super::homography;
-use super::least_squares::{Descending, Descent};
 use super::lens::Lens;
 use super::pose::{Pose, turn};
+use crate::least_squares::{Descending, Descent};
 
 /// A point of the board and where it was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -23,7 +23,6 @@ mod known_board;
 mod lattice;
 mod layout;
 mod learning;
-mod least_squares;
 mod lens;
 mod light;
 mod line;

@@ -1,0 +1,190 @@
+//! What is compared: the light of two points that may have one albedo, or of one whose albedo is known. And at what cost.
+
+use rayon::prelude::*;
+
+use super::points::Grid;
+
+/// From cell to cell of a pair: edges of shadows near by, slopes and other faces farther away.
+const STEPS: [[isize; 2]; 12] = [
+    [1, 0],
+    [0, 1],
+    [3, 0],
+    [0, 3],
+    [2, 2],
+    [2, -2],
+    [8, 0],
+    [0, 8],
+    [6, 6],
+    [6, -6],
+    [20, 0],
+    [0, 20],
+];
+/// Difference in ln of chromaticity at which a pair of points hardly passes for one albedo. Shadows have colours too: a pair keeps the
+/// least weight.
+const CHROMATICITY: f32 = 0.15;
+const LEAST_WEIGHT: f32 = 0.1;
+/// Blocks of the photograph whose errors are taken for independent, across and down, and the parts of a cross-validation.
+const BLOCKS: [usize; 2] = [8, 6];
+pub const BLOCK_COUNT: usize = BLOCKS[0] * BLOCKS[1];
+pub const FOLDS: usize = 4;
+/// Spread of ln of luminance that no surface goes below.
+const LEAST_SIGMA: f64 = 0.02;
+
+/// Two points, or one.
+#[derive(Clone, Copy, Debug)]
+struct Term {
+    a: u32,
+    /// `u32::MAX`: the albedo of `a` is known.
+    b: u32,
+    /// ln of the photograph's luminance: of `a` over `b`, or of the irradiance of `a`.
+    shown: f32,
+    weight: f32,
+    block: u16,
+}
+
+const KNOWN: u32 = u32::MAX;
+
+/// All comparisons of a photograph.
+pub struct Comparisons {
+    terms: Vec<Term>,
+    /// Some albedo is known, so that the light has a size.
+    pub are_absolute: bool,
+}
+
+/// Robust costs by block of the photograph.
+pub type Costs = [f64; BLOCK_COUNT];
+
+/// The part of a cross-validation that a block belongs to.
+pub fn fold_of(block: usize) -> usize {
+    (block % BLOCKS[0] + 2 * (block / BLOCKS[0])) % FOLDS
+}
+
+impl Comparisons {
+    pub fn of(grid: &Grid) -> Self {
+        let mut terms = Vec::new();
+        for (a, point) in grid.points.iter().enumerate() {
+            let [column, row] = point.cell;
+            let block = row * BLOCKS[1] / grid.height * BLOCKS[0] + column * BLOCKS[0] / grid.width;
+            let term = |b, shown: f64, weight| Term {
+                a: a as u32,
+                b,
+                shown: shown as f32,
+                weight,
+                block: block as u16,
+            };
+            if point.albedo.is_some() {
+                terms.push(term(KNOWN, point.log_shown(), 1.0));
+                continue;
+            }
+            for [dx, dy] in STEPS {
+                let at = |at: usize, step: isize, count: usize| {
+                    at.checked_add_signed(step).filter(|at| *at < count)
+                };
+                let place = at(column, dx, grid.width).zip(at(row, dy, grid.height));
+                let there = place.and_then(|(x, y)| grid.point_of_cell[y * grid.width + x]);
+                let Some(b) = there else { continue };
+                let other = &grid.points[b as usize];
+                if other.albedo.is_some() {
+                    continue;
+                }
+                let (here, there) = (point.chromaticity(), other.chromaticity());
+                let away = (here[0] - there[0]).powi(2) + (here[1] - there[1]).powi(2);
+                let alike = (-away / (CHROMATICITY * CHROMATICITY)).exp();
+                let shown = point.log_shown() - other.log_shown();
+                terms.push(term(b, shown, alike.max(LEAST_WEIGHT)));
+            }
+        }
+        let are_absolute = terms.iter().any(|term| term.b == KNOWN);
+        Self {
+            terms,
+            are_absolute,
+        }
+    }
+
+    fn residual(term: &Term, log_light: &[f32]) -> f32 {
+        let light = log_light[term.a as usize];
+        match term.b {
+            KNOWN => term.shown - light,
+            b => term.shown - (light - log_light[b as usize]),
+        }
+    }
+
+    /// Of what light is missing where the albedo is known, ln; `None`: it is known nowhere.
+    pub fn median_of_known(&self, log_light: &[f32]) -> Option<f64> {
+        if !self.are_absolute {
+            return None;
+        }
+        let known = self.terms.iter().filter(|term| term.b == KNOWN);
+        let mut missing: Vec<f32> = known.map(|term| Self::residual(term, log_light)).collect();
+        let middle = missing.len() / 2;
+        let (_, median, _) = missing.select_nth_unstable_by(middle, f32::total_cmp);
+        Some(f64::from(*median))
+    }
+
+    /// Cauchy's cost of every `stride`th comparison, by block.
+    pub fn costs(&self, log_light: &[f32], sigma: f64, stride: usize) -> Costs {
+        let mut costs = [0.0; BLOCK_COUNT];
+        let inv = (1.0 / (sigma * sigma)) as f32;
+        for term in self.terms.iter().step_by(stride) {
+            let r = Self::residual(term, log_light);
+            costs[usize::from(term.block)] += f64::from(term.weight * (r * r * inv).ln_1p());
+        }
+        costs
+    }
+
+    pub fn cost(&self, log_light: &[f32], sigma: f64, stride: usize) -> f64 {
+        self.costs(log_light, sigma, stride).iter().sum()
+    }
+
+    /// Of the residuals, from their median absolute value.
+    pub fn spread(&self, log_light: &[f32]) -> f64 {
+        let mut sizes: Vec<f32> = (self.terms.par_iter())
+            .map(|term| Self::residual(term, log_light).abs())
+            .collect();
+        if sizes.is_empty() {
+            return LEAST_SIGMA;
+        }
+        let middle = sizes.len() / 2;
+        let (_, median, _) = sizes.select_nth_unstable_by(middle, f32::total_cmp);
+        (1.4826 * f64::from(*median)).max(LEAST_SIGMA)
+    }
+
+    /// Residuals with the weights of iteratively reweighted least squares and their blocks, and what `slopes`, by parameter and point, make of
+    /// them: all that a step of Gauss and Newton needs.
+    pub fn linearised(&self, log_light: &[f32], slopes: &[Vec<f32>], sigma: f64) -> Linearised {
+        let n = slopes.len();
+        let inv = (1.0 / (sigma * sigma)) as f32;
+        let mut sums = Linearised {
+            normal: vec![0.0; n * n],
+            gradients: vec![vec![0.0; n]; BLOCK_COUNT],
+        };
+        let mut row = vec![0.0f64; n];
+        for term in &self.terms {
+            let r = Self::residual(term, log_light);
+            let weight = f64::from(term.weight / (1.0 + r * r * inv));
+            for (value, slope) in row.iter_mut().zip(slopes) {
+                let here = slope[term.a as usize];
+                *value = f64::from(match term.b {
+                    KNOWN => here,
+                    b => here - slope[b as usize],
+                });
+            }
+            let gradient = &mut sums.gradients[usize::from(term.block)];
+            for i in 0..n {
+                gradient[i] += weight * f64::from(r) * row[i];
+                for j in 0..n {
+                    sums.normal[i * n + j] += weight * row[i] * row[j];
+                }
+            }
+        }
+        sums
+    }
+}
+
+/// Normal equations of the parameters.
+pub struct Linearised {
+    /// Row-major.
+    pub normal: Vec<f64>,
+    /// By block, of the parameters.
+    pub gradients: Vec<Vec<f64>>,
+}

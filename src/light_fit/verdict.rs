@@ -1,0 +1,69 @@
+//! Whether a light explains what it was not fitted to.
+
+use super::comparisons::{BLOCK_COUNT, Costs, FOLDS, fold_of};
+use super::fitter::Candidate;
+
+/// Of the cost without any shading: less is no reason to change a scene.
+const LEAST_GAIN: f64 = 0.02;
+/// Standard errors from 0 that a gain must have, as many candidates were tried.
+const LEAST_SIGNIFICANCE: f64 = 3.0;
+
+/// What one kind of light explains more than another, of parts of the photograph that did not choose among its candidates.
+#[derive(Clone, Copy, Debug)]
+pub struct Gain {
+    /// Of the cost without any shading.
+    pub share: f64,
+    /// Over its standard error, from the scatter over the blocks.
+    pub significance: f64,
+}
+
+impl Gain {
+    /// Cross-validation over the parts of the photograph.
+    pub fn of(candidates: &[Candidate], over: &[Candidate], flat: &Costs) -> Self {
+        let costs = |all: &[Candidate]| held_out(all.iter().map(|c| &c.costs).collect());
+        Self::between(&costs(candidates), &costs(over), flat)
+    }
+
+    /// Over no shading at all.
+    pub fn over_flat(candidates: &[Candidate], flat: &Costs) -> Self {
+        let costs = held_out(candidates.iter().map(|c| &c.costs).collect());
+        Self::between(&costs, flat, flat)
+    }
+
+    fn between(with: &Costs, without: &Costs, flat: &Costs) -> Self {
+        let gains: Vec<f64> = (without.iter().zip(with)).map(|(a, b)| a - b).collect();
+        let n = BLOCK_COUNT as f64;
+        let total: f64 = gains.iter().sum();
+        let scatter: f64 = gains.iter().map(|gain| (gain - total / n).powi(2)).sum();
+        let error = (scatter * n / (n - 1.0)).sqrt();
+        let all: f64 = flat.iter().sum();
+        Self {
+            share: total / all.max(1e-12),
+            significance: if error > 0.0 { total / error } else { 0.0 },
+        }
+    }
+
+    pub fn is_real(&self) -> bool {
+        self.share >= LEAST_GAIN && self.significance >= LEAST_SIGNIFICANCE
+    }
+}
+
+/// Costs of each block by the candidate that the other parts of the photograph choose.
+fn held_out(candidates: Vec<&Costs>) -> Costs {
+    let mut costs = [0.0; BLOCK_COUNT];
+    for fold in 0..FOLDS {
+        let of_rest = |costs: &Costs| -> f64 {
+            let blocks = costs.iter().enumerate();
+            blocks
+                .filter(|(block, _)| fold_of(*block) != fold)
+                .map(|(_, cost)| cost)
+                .sum()
+        };
+        let chosen = (candidates.iter()).min_by(|a, b| of_rest(a).total_cmp(&of_rest(b)));
+        let Some(chosen) = chosen else { continue };
+        for block in (0..BLOCK_COUNT).filter(|block| fold_of(*block) == fold) {
+            costs[block] = chosen[block];
+        }
+    }
+    costs
+}
