@@ -267,6 +267,7 @@ impl PackedScene {
                     self.env_mean_luminance,
                 );
                 self.env_cdf = table.cdf;
+                self.env_starts = table.starts;
             }
         }
     }

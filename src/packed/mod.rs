@@ -34,6 +34,8 @@ pub struct PackedScene {
     pub env_texels: Vec<f32>,
     /// Cumulative distributions of the environment's cells (see `light::environment_table::EnvironmentTable`).
     pub env_cdf: Vec<f32>,
+    /// `EnvironmentTable::starts`, for the CPU alone.
+    pub env_starts: Vec<u32>,
     /// For `albedo = "from-photo"`, empty where unused: albedo of the photograph's pixels and the depth (metres along the axis) it was seen
     /// at, then for each scene object its patches, [`records::PHOTO_PATCHES`] pairs: mean albedo of the pixels that see a part of it and how many
     /// they are; their mean position, metres, and mean squared distance from it.
@@ -109,6 +111,7 @@ impl PackedScene {
             lights: Vec::new(),
             env_texels: Vec::new(),
             env_cdf: Vec::new(),
+            env_starts: Vec::new(),
             photo_albedo: Vec::new(),
             guide: Vec::new(),
             facet_tables: Vec::new(),

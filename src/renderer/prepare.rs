@@ -187,7 +187,8 @@ impl Renderer {
             (None, _) => {}
             (Some(_), false) => self.surfaces = cpu::diffuse_surfaces(&core.packed),
             (Some(_), true) if self.surfaces.is_empty() => {
-                self.surfaces = cpu::diffuse_surfaces_of_pinhole(&core.packed);
+                self.surfaces =
+                    cpu::diffuse_surfaces_of_pinhole(&core.packed, core.lens_grid.as_ref());
             }
             (Some(_), true) => {}
         }

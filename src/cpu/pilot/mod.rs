@@ -11,27 +11,25 @@ mod highlights;
 mod importance;
 mod measurement;
 mod patch;
+mod reach;
 
-use std::borrow::Cow;
 use std::ops::Add;
-
-use glam::Vec3;
-use rayon::prelude::*;
 
 use super::contribution::photons_traced;
 use super::photons::guide::learn;
 use super::photons::plan::{EyeMoments, photons_per_ray, unmeasured};
 use allocation::{Rates, allocate};
-use beam::{Beam, Sphere};
+use beam::Beam;
 use blocks::Blocks;
 #[cfg(feature = "bench")]
 pub(crate) use importance::MAX_LIGHTS_EXAMINED;
 use importance::{PilotLights, importance};
 use measurement::Moments;
 pub use patch::LensGrid;
-use patch::{Certainty, Patch};
+pub(super) use patch::{Certainty, each_patch, in_world};
+use reach::WorldSpheres;
+pub(super) use reach::real_sphere;
 
-use crate::camera::shutter::camera_pose;
 use crate::cpu::sharing::BLOCK_SIDE;
 use crate::packed::{
     ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_GUIDE, FRAME_NO_SHARING,
@@ -139,39 +137,28 @@ fn look(
     meter: &Meter<'_>,
 ) -> (Vec<u32>, Vec<f32>) {
     let frame = &scene.frame;
-    let pinhole = Frame {
-        aperture_radius: 0.0,
-        ..*frame
-    };
     let spheres = WorldSpheres::of(scene);
     let weighs = frame.estimator != ESTIMATOR_PAPER;
     let lights = weighs.then(|| PilotLights::of(scene));
-    let findings: Vec<PatchFindings> = (0..Patch::count(frame))
-        .into_par_iter()
-        .map(|index| {
-            let patch = match grid {
-                Some(grid) => Cow::Borrowed(&grid.patches[index]),
-                None => Cow::Owned(Patch::of(frame, &pinhole, index)),
-            };
-            let flags = spheres.flags(frame, &patch);
-            meter.add(flags.len() as u64);
-            let importances = lights.iter().flat_map(|lights| {
-                let firsts = patch.firsts(frame, blocks::SIDE_PX);
-                firsts.map(|(at, pixel)| {
-                    let found = match flags[at].1 {
-                        // Nor does its ray meet anything real.
-                        PIXEL_OUT_OF_REACH => 0.0,
-                        _ => importance(scene, &Beam::of_pixel(frame, &patch, at), lights),
-                    };
-                    (blocks.of_pixel(pixel), found)
-                })
-            });
-            PatchFindings {
-                importances: importances.collect(),
-                flags,
-            }
-        })
-        .collect();
+    let findings = each_patch(frame, grid, |patch| {
+        let flags = spheres.flags(frame, patch);
+        meter.add(flags.len() as u64);
+        let importances = lights.iter().flat_map(|lights| {
+            let firsts = patch.firsts(frame, blocks::SIDE_PX);
+            firsts.map(|(at, pixel)| {
+                let found = match flags[at].1 {
+                    // Nor does its ray meet anything real.
+                    PIXEL_OUT_OF_REACH => 0.0,
+                    _ => importance(scene, &Beam::of_pixel(frame, patch, at), lights),
+                };
+                (blocks.of_pixel(pixel), found)
+            })
+        });
+        PatchFindings {
+            importances: importances.collect(),
+            flags,
+        }
+    });
     let mut flags = vec![0; scene.frame.width as usize * scene.frame.height as usize];
     let mut importances = vec![0.0; blocks.count()];
     for patch in findings {
@@ -183,59 +170,6 @@ fn look(
         }
     }
     (flags, importances)
-}
-
-/// What holds the virtual and the real world.
-struct WorldSpheres {
-    virtual_: Vec<Sphere>,
-    real: Vec<Sphere>,
-}
-
-impl WorldSpheres {
-    fn of(scene: &PackedScene) -> Self {
-        let virtual_ = match scene.swept_spheres.as_slice() {
-            [] => &scene.frame.spheres[..scene.frame.sphere_count as usize],
-            swept => swept,
-        };
-        let real = scene.real_bvh.bounds();
-        Self {
-            virtual_: (virtual_.iter())
-                .map(|s| (Vec3::new(s[0], s[1], s[2]), s[3]))
-                .collect(),
-            real: (real.iter())
-                .map(|&(lo, hi)| ((lo + hi) * 0.5, (hi - lo).length() * 0.5))
-                .collect(),
-        }
-    }
-
-    /// Of each pixel of a patch, with its number in the picture.
-    fn flags(&self, frame: &Frame, patch: &Patch) -> Vec<(usize, u32)> {
-        let pose = camera_pose(frame);
-        let of_all = |spheres: &[Sphere]| {
-            let each = spheres.iter();
-            let each = each.map(|&sphere| patch.meets_sphere(frame, &pose, sphere));
-            each.fold(Certainty::Never, Certainty::or)
-        };
-        let (near, real) = (of_all(&self.virtual_), of_all(&self.real));
-        let each = patch.pixels(frame).enumerate();
-        each.map(|(at, pixel)| {
-            let asked = (near == Certainty::Open
-                || near == Certainty::Never && real == Certainty::Open)
-                .then(|| Beam::of_pixel(frame, patch, at));
-            let meets = |certainty: Certainty, spheres: &[Sphere]| match certainty {
-                Certainty::Never => false,
-                Certainty::Always => true,
-                Certainty::Open => asked.as_ref().is_some_and(|b| b.may_meet_any(spheres)),
-            };
-            let flags = match meets(near, &self.virtual_) {
-                true => PIXEL_BEAM_MAY_MEET_VIRTUAL,
-                false if meets(real, &self.real) => 0,
-                false => PIXEL_OUT_OF_REACH,
-            };
-            (pixel, flags)
-        })
-        .collect()
-    }
 }
 
 /// What samples scatter and cost, and the squared errors of highlights, by blocks.

@@ -10,7 +10,7 @@ use crate::distortion::{LENS_FISHEYE, fisheye_direction};
 use crate::packed::{FRAME_SHUTTER, Frame};
 
 /// Pixels along a patch's side; a multiple of a block's.
-pub const SIDE_PX: usize = 16;
+const SIDE_PX: usize = 16;
 /// Far above rounding.
 const MARGIN: f32 = 1.01;
 const LEAST_ANGLE: f32 = 1e-5;
@@ -61,12 +61,12 @@ impl Certainty {
 }
 
 impl Patch {
-    pub fn count(frame: &Frame) -> usize {
+    fn count(frame: &Frame) -> usize {
         columns(frame) * (frame.height as usize).div_ceil(SIDE_PX)
     }
 
     /// `pinhole`: the frame without its aperture.
-    pub fn of(frame: &Frame, pinhole: &Frame, patch: usize) -> Self {
+    fn of(frame: &Frame, pinhole: &Frame, patch: usize) -> Self {
         let columns = columns(frame);
         let (column, row) = (patch % columns * SIDE_PX, patch / columns * SIDE_PX);
         let (width, height) = (
@@ -171,6 +171,25 @@ impl Patch {
     }
 }
 
+/// What `f` finds in each patch of the picture, in their order; with a grid of the lens nothing is undistorted.
+pub fn each_patch<T: Send>(
+    frame: &Frame,
+    grid: Option<&LensGrid>,
+    f: impl Fn(&Patch) -> T + Sync,
+) -> Vec<T> {
+    let pinhole = Frame {
+        aperture_radius: 0.0,
+        ..*frame
+    };
+    let patches = (0..Patch::count(frame)).into_par_iter();
+    patches
+        .map(|index| match grid {
+            Some(grid) => f(&grid.patches[index]),
+            None => f(&Patch::of(frame, &pinhole, index)),
+        })
+        .collect()
+}
+
 fn columns(frame: &Frame) -> usize {
     (frame.width as usize).div_ceil(SIDE_PX)
 }
@@ -194,7 +213,7 @@ pub fn in_world(pose: &CameraPose, look: Vec3) -> Vec3 {
 #[derive(Clone, Debug)]
 pub struct LensGrid {
     lens: LensKey,
-    pub patches: Vec<Patch>,
+    patches: Vec<Patch>,
 }
 
 /// What patches depend on.
@@ -221,16 +240,9 @@ impl LensKey {
 
 impl LensGrid {
     pub fn of(frame: &Frame) -> Self {
-        let pinhole = Frame {
-            aperture_radius: 0.0,
-            ..*frame
-        };
-        let patches = (0..Patch::count(frame)).into_par_iter();
         Self {
             lens: LensKey::of(frame),
-            patches: patches
-                .map(|patch| Patch::of(frame, &pinhole, patch))
-                .collect(),
+            patches: each_patch(frame, None, Patch::clone),
         }
     }
 
