@@ -15,12 +15,12 @@ use rayon::prelude::*;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-const SCENES: [&str; 3] = ["room", "far", "sunny"];
+const SCENES: [&str; 4] = ["room", "far", "sunny", "caustics"];
 const SEEDS: u32 = 200;
 /// Divides the scenes' size where 200 seeds are rendered.
 const SMALL: u32 = 10;
 /// Of each scene.
-const GOALS: [&[f64]; SCENES.len()] = [&[0.02, 0.006], &[0.02, 0.006], &[0.05]];
+const GOALS: [&[f64]; SCENES.len()] = [&[0.02, 0.006], &[0.02, 0.006], &[0.05], &[0.03]];
 const REFERENCE_RAYS: u32 = 1 << 15;
 const REFERENCE_SEED: u32 = 1_000_003;
 

@@ -29,6 +29,12 @@ impl ProcessorTime {
     }
 }
 
+/// What the processors have spent on the calling thread so far; nothing where the system does not say.
+#[cfg(feature = "preview")]
+pub(crate) fn thread_time() -> Duration {
+    cpu_time::ThreadTime::try_now().map_or(Duration::ZERO, |time| time.as_duration())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

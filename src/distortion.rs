@@ -257,6 +257,10 @@ pub fn undistort_fast(model: u32, k: &Coefficients<f32>, distorted: [f32; 2]) ->
         let at = distort(model, k, [x, y]);
         let ex = at[0] - distorted[0];
         let ey = at[1] - distorted[1];
+        if ex == 0.0 && ey == 0.0 {
+            // Further steps stay; a device's lanes would only wait for one another.
+            break;
+        }
         let [jxx, jxy, jyx, jyy] = jacobian(model, k, [x, y]);
         let determinant = jxx * jyy - jxy * jyx;
         // Bounded steps: a pixel that cannot be inverted is refused at load, but must not overflow either.
@@ -272,6 +276,9 @@ pub fn fisheye_angle_fast(k: &Coefficients<f32>, r: f32) -> f32 {
     let mut angle = r.min(WIDEST_ANGLE);
     for _ in 0..UNDISTORT_STEPS {
         let error = fisheye_radius(k, angle) - r;
+        if error == 0.0 {
+            break;
+        }
         angle -= (error / fisheye_slope(k, angle).max(1e-4)).clamp(-0.5, 0.5);
         angle = angle.clamp(0.0, WIDEST_ANGLE);
     }

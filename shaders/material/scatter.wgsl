@@ -45,8 +45,9 @@ fn terminator(ng: vec3<f32>, ns: vec3<f32>, wi: vec3<f32>) -> f32 {
     if of_facet >= of_smooth * NO_FADE {
         return 1.0;
     }
-    let g = of_facet / of_smooth;
-    return g * (1.0 + g - g * g);
+    let lower = 1.0 - of_facet / of_smooth;
+    let lower2 = lower * lower;
+    return 1.0 - lower2 * lower2;
 }
 
 fn kept_at_terminator(s: Surface, wi: vec3<f32>) -> f32 {

@@ -66,7 +66,7 @@ pub(super) fn depth(tree: &Bvh2) -> usize {
 
 /// Boxes of the triangles, enlarged by one to three times the bound that the triangle test needs. The varying part keeps identical
 /// triangles from looking equally near to PLOC, which then would merge one pair at a time into a chain.
-fn padded_boxes(triangles: &[[Vec3; 3]]) -> Vec<Aabb> {
+pub(super) fn padded_boxes(triangles: &[[Vec3; 3]]) -> Vec<Aabb> {
     triangles
         .iter()
         .enumerate()

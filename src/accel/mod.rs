@@ -112,6 +112,16 @@ impl WorldBvh {
         })
     }
 
+    /// Moves the triangles that rest, of which there are as many as before: the tree keeps its shape, and its boxes take their new size. False, and
+    /// nothing is done, if there are more or fewer.
+    ///
+    /// # Errors
+    /// As [`WorldBvh::build`].
+    pub fn refit(&mut self, triangles: &[[Vec3; 3]]) -> Result<bool, AccelError> {
+        self.roots = OnceLock::new();
+        self.resting.refit(triangles)
+    }
+
     /// Replaces the triangles that move, whose ids follow those that rest; what rests is not touched.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! Few spheres that contain all triangles.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
@@ -10,6 +10,60 @@ const LEAST_GAIN: f64 = 0.15;
 const BINS: usize = 16;
 /// Passes of the centre's walk towards the farthest point.
 const WALK_STEPS: usize = 64;
+
+/// Triangles whose corners know which of them lie at one point.
+struct Mesh {
+    /// Indices of points.
+    triangles: Vec<[u32; 3]>,
+    points: Vec<DVec3>,
+    /// By point, the last cluster that it was counted for.
+    counted: Vec<u32>,
+    /// Clusters so far.
+    clusters: u32,
+}
+
+impl Mesh {
+    fn new(corners: &[[Vec3; 3]]) -> Self {
+        let mut known = HashMap::new();
+        let mut points = Vec::new();
+        let triangles = corners.iter().map(|triangle| {
+            triangle.map(|corner| {
+                *known
+                    .entry(corner.to_array().map(f32::to_bits))
+                    .or_insert_with(|| {
+                        points.push(corner.as_dvec3());
+                        points.len() as u32 - 1
+                    })
+            })
+        });
+        let triangles = triangles.collect();
+        Self {
+            triangles,
+            counted: vec![0; points.len()],
+            points,
+            clusters: 0,
+        }
+    }
+
+    fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].map(|point| self.points[point as usize])
+    }
+
+    /// The points of some triangles, each once: most corners are those of several triangles.
+    fn points_of(&mut self, triangles: &[u32]) -> Vec<DVec3> {
+        self.clusters += 1;
+        let mut points = Vec::new();
+        for triangle in triangles {
+            for point in self.triangles[*triangle as usize] {
+                if self.counted[point as usize] != self.clusters {
+                    self.counted[point as usize] = self.clusters;
+                    points.push(self.points[point as usize]);
+                }
+            }
+        }
+        points
+    }
+}
 
 struct Cluster {
     /// Indices into the mesh.
@@ -46,7 +100,8 @@ impl Cover {
         if mesh.is_empty() {
             return cover;
         }
-        let all = (0..mesh.len() as u32).collect();
+        let mesh = &mut Mesh::new(mesh);
+        let all = (0..mesh.triangles.len() as u32).collect();
         let mut clusters = vec![Cluster::new(mesh, all)];
         cover.whole = Some(clusters[0].rounded());
         if max > 1 {
@@ -77,6 +132,29 @@ impl Cover {
         cover
     }
 
+    /// Of the mesh moved by `to`, which makes nothing longer by more than `stretch`; coordinates of its triangles are rounded to f32.
+    pub fn placed(&self, to: impl Fn(DVec3) -> DVec3, stretch: f64) -> Self {
+        let place = |[x, y, z, radius]: [f32; 4]| {
+            let center = to(DVec3::new(f64::from(x), f64::from(y), f64::from(z)));
+            let rounding = 1e-6 * center.abs().max_element();
+            rounded(center, stretch * f64::from(radius) + rounding)
+        };
+        let split = |split: &Split| Split {
+            replaced: split.replaced,
+            parts: split.parts.map(place),
+            gain: split.gain * stretch * stretch,
+        };
+        Self {
+            whole: self.whole.map(place),
+            splits: self.splits.iter().map(split).collect(),
+        }
+    }
+
+    /// Of no triangle.
+    pub fn is_empty(&self) -> bool {
+        self.whole.is_none()
+    }
+
     /// At most `max` spheres over all meshes, or one a mesh; fewer where more would hardly be smaller in total cross-section. Of two meshes
     /// the one is split whose next split saves more.
     pub fn spheres(covers: &[&Cover], max: usize) -> Vec<[f32; 4]> {
@@ -100,19 +178,9 @@ impl Cover {
     }
 }
 
-fn corners(mesh: &[[Vec3; 3]], triangle: u32) -> impl Iterator<Item = DVec3> + '_ {
-    mesh[triangle as usize].iter().map(|v| v.as_dvec3())
-}
-
 impl Cluster {
-    fn new(mesh: &[[Vec3; 3]], triangles: Vec<u32>) -> Cluster {
-        // Most corners are those of several triangles.
-        let mut known = HashSet::new();
-        let points: Vec<DVec3> = (triangles.iter())
-            .flat_map(|&triangle| mesh[triangle as usize])
-            .filter(|corner| known.insert(corner.to_array().map(f32::to_bits)))
-            .map(|corner| corner.as_dvec3())
-            .collect();
+    fn new(mesh: &mut Mesh, triangles: Vec<u32>) -> Cluster {
+        let points = mesh.points_of(&triangles);
         let mut low = DVec3::INFINITY;
         let mut high = DVec3::NEG_INFINITY;
         for &point in &points {
@@ -161,11 +229,11 @@ impl Cluster {
     }
 
     /// Finds the best split by the surface area heuristic on the triangles' centres, and keeps it if it gains enough.
-    fn find_split(&mut self, mesh: &[[Vec3; 3]]) {
+    fn find_split(&mut self, mesh: &mut Mesh) {
         let centers: Vec<DVec3> = self
             .triangles
             .iter()
-            .map(|&t| corners(mesh, t).sum::<DVec3>() / 3.0)
+            .map(|&t| mesh.corners(t).into_iter().sum::<DVec3>() / 3.0)
             .collect();
         let (low, high) = centers
             .iter()
@@ -181,7 +249,7 @@ impl Cluster {
             let mut bins = [(DVec3::INFINITY, DVec3::NEG_INFINITY); BINS];
             for (&triangle, center) in self.triangles.iter().zip(&centers) {
                 let bin = (((center[axis] - low[axis]) / width) as usize).min(BINS - 1);
-                for corner in corners(mesh, triangle) {
+                for corner in mesh.corners(triangle) {
                     bins[bin] = (bins[bin].0.min(corner), bins[bin].1.max(corner));
                 }
             }
@@ -223,11 +291,15 @@ impl Cluster {
         }
     }
 
-    /// In f32, the radius raised by what rounding the centre and itself can lose.
     fn rounded(&self) -> [f32; 4] {
-        let center = self.center.as_vec3();
-        let shift = center.as_dvec3().distance(self.center);
-        let radius = (self.radius + shift) * (1.0 + 1e-6);
-        [center.x, center.y, center.z, (radius as f32).next_up()]
+        rounded(self.center, self.radius)
     }
+}
+
+/// In f32, the radius raised by what rounding the centre and itself can lose.
+fn rounded(exact: DVec3, radius: f64) -> [f32; 4] {
+    let center = exact.as_vec3();
+    let shift = center.as_dvec3().distance(exact);
+    let radius = (radius + shift) * (1.0 + 1e-6);
+    [center.x, center.y, center.z, (radius as f32).next_up()]
 }

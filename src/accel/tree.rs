@@ -31,17 +31,7 @@ impl Tree {
                 count: triangles.len(),
             });
         }
-        let mut low = Vec3::splat(f32::INFINITY);
-        let mut high = Vec3::splat(f32::NEG_INFINITY);
-        for (index, triangle) in triangles.iter().enumerate() {
-            for vertex in triangle {
-                if !vertex.is_finite() || vertex.abs().max_element() > MAX_COORDINATE_M {
-                    return Err(AccelError::Coordinate { triangle: index });
-                }
-                low = low.min(*vertex);
-                high = high.max(*vertex);
-            }
-        }
+        let bounds = bounds_of(triangles)?;
         let mut tree = binary::build(triangles);
         let mut wide = WideBvh::empty();
         if let Some(built) = &mut tree {
@@ -57,8 +47,25 @@ impl Tree {
             triangles: triangles.to_vec(),
             first_id,
             compressed: OnceLock::new(),
-            bounds: (!triangles.is_empty()).then_some((low, high)),
+            bounds,
         })
+    }
+
+    /// As [`super::WorldBvh::refit`].
+    ///
+    /// # Errors
+    /// As [`super::WorldBvh::build`].
+    pub(super) fn refit(&mut self, triangles: &[[Vec3; 3]]) -> Result<bool, AccelError> {
+        if triangles.len() != self.triangles.len() {
+            return Ok(false);
+        }
+        self.bounds = bounds_of(triangles)?;
+        self.wide.refit(triangles, self.first_id);
+        self.triangles.copy_from_slice(triangles);
+        // A device that asks for its tree has it built anew.
+        self.binary = Mutex::new(None);
+        self.compressed = OnceLock::new();
+        Ok(true)
     }
 
     /// The first id after those of this tree.
@@ -71,7 +78,8 @@ impl Tree {
         self.compressed.get_or_init(|| {
             let convert =
                 |tree: &Bvh2| CompressedBvh::convert(tree, &self.triangles, self.first_id, place);
-            match self.binary.lock().unwrap_or_else(|e| e.into_inner()).take() {
+            let built = self.binary.lock().unwrap_or_else(|e| e.into_inner()).take();
+            match built.or_else(|| binary::build(&self.triangles)) {
                 Some(tree) => convert(&tree).unwrap_or_else(|| {
                     convert(&binary::build_balanced(&self.triangles))
                         .expect("a balanced tree fits the stack")
@@ -80,6 +88,22 @@ impl Tree {
             }
         })
     }
+}
+
+/// Smallest and largest vertex coordinates; `None` without triangles.
+fn bounds_of(triangles: &[[Vec3; 3]]) -> Result<Option<(Vec3, Vec3)>, AccelError> {
+    let mut low = Vec3::splat(f32::INFINITY);
+    let mut high = Vec3::splat(f32::NEG_INFINITY);
+    for (index, triangle) in triangles.iter().enumerate() {
+        for vertex in triangle {
+            if !vertex.is_finite() || vertex.abs().max_element() > MAX_COORDINATE_M {
+                return Err(AccelError::Coordinate { triangle: index });
+            }
+            low = low.min(*vertex);
+            high = high.max(*vertex);
+        }
+    }
+    Ok((!triangles.is_empty()).then_some((low, high)))
 }
 
 fn collapse(tree: &Bvh2, triangles: &[[Vec3; 3]], first_id: u32) -> Option<WideBvh> {

@@ -2,8 +2,10 @@
 //! (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017, section 3.1).
 
 use glam::Vec3;
+use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 
+use super::binary::padded_boxes;
 use super::large_pages::on_large_pages;
 
 /// High bit of a child word: the child is a leaf, the rest is first block << 3 | blocks - 1. Without it the word is a node index.
@@ -45,6 +47,8 @@ pub(super) struct WideBvh {
     pub(super) nodes: Vec<WideNode>,
     /// Block 0 is the all-zero one.
     pub(super) blocks: Vec<TriangleBlock>,
+    /// Triangles of each block: its first lanes.
+    filled: Vec<u8>,
 }
 
 const EMPTY_NODE: WideNode = WideNode {
@@ -56,6 +60,25 @@ const ZERO_BLOCK: TriangleBlock = TriangleBlock {
     rows: [[[0.0; WIDTH]; 3]; 3],
     ids: [0; WIDTH],
 };
+
+impl WideNode {
+    fn set_slot(&mut self, slot: usize, bounds: &Aabb) {
+        for axis in 0..3 {
+            self.planes[axis][0][slot] = bounds.min[axis];
+            self.planes[axis][1][slot] = bounds.max[axis];
+        }
+    }
+}
+
+impl TriangleBlock {
+    fn set_lane(&mut self, lane: usize, corners: &[Vec3; 3]) {
+        for (vertex, position) in corners.iter().enumerate() {
+            for axis in 0..3 {
+                self.rows[vertex][axis][lane] = position[axis];
+            }
+        }
+    }
+}
 
 /// Cheapest ways to represent the subtree of a BVH2 node.
 #[derive(Clone, Copy)]
@@ -76,7 +99,53 @@ impl WideBvh {
         WideBvh {
             nodes: vec![EMPTY_NODE],
             blocks: vec![ZERO_BLOCK],
+            filled: vec![0],
         }
+    }
+
+    /// Moves the triangles; the tree keeps its shape.
+    pub(super) fn refit(&mut self, triangles: &[[Vec3; 3]], first_id: u32) {
+        let boxes = padded_boxes(triangles);
+        let mut bounds = vec![Aabb::empty(); self.nodes.len()];
+        // Children stand after their parents.
+        for index in (0..self.nodes.len()).rev() {
+            let mut whole = Aabb::empty();
+            for slot in 0..WIDTH {
+                let child = self.nodes[index].children[slot];
+                let of_child = match child & LEAF {
+                    _ if child == LEAF => continue,
+                    0 => bounds[child as usize],
+                    _ => self.refit_leaf(child, triangles, &boxes, first_id),
+                };
+                self.nodes[index].set_slot(slot, &of_child);
+                whole = whole.union(&of_child);
+            }
+            bounds[index] = whole;
+        }
+    }
+
+    /// The leaf's box.
+    fn refit_leaf(
+        &mut self,
+        leaf: u32,
+        triangles: &[[Vec3; 3]],
+        boxes: &[Aabb],
+        first_id: u32,
+    ) -> Aabb {
+        let first = ((leaf & !LEAF) >> 3) as usize;
+        let end = first + 1 + (leaf & 7) as usize;
+        let mut whole = Aabb::empty();
+        for (block, &filled) in self.blocks[first..end]
+            .iter_mut()
+            .zip(&self.filled[first..end])
+        {
+            for lane in 0..filled as usize {
+                let triangle = (block.ids[lane] - first_id) as usize;
+                block.set_lane(lane, &triangles[triangle]);
+                whole = whole.union(&boxes[triangle]);
+            }
+        }
+        whole
     }
 
     /// `None` if the tree is deeper than [`MAX_LEVELS`].
@@ -105,16 +174,14 @@ impl WideBvh {
                     index as u32
                 };
                 let node = &mut wide.nodes[target];
-                for axis in 0..3 {
-                    node.planes[axis][0][slot] = bounds.min[axis];
-                    node.planes[axis][1][slot] = bounds.max[axis];
-                }
+                node.set_slot(slot, bounds);
                 node.children[slot] = word;
             }
         }
         Some(WideBvh {
             nodes: on_large_pages(&wide.nodes),
             blocks: on_large_pages(&wide.blocks),
+            filled: wide.filled,
         })
     }
 
@@ -132,15 +199,13 @@ impl WideBvh {
             let triangle = tree.primitive_indices[node.first_index as usize];
             if count % WIDTH == 0 {
                 self.blocks.push(ZERO_BLOCK);
+                self.filled.push(0);
             }
-            let block = &mut self.blocks[first + count / WIDTH];
+            let at = first + count / WIDTH;
             let lane = count % WIDTH;
-            for (vertex, position) in triangles[triangle as usize].iter().enumerate() {
-                for axis in 0..3 {
-                    block.rows[vertex][axis][lane] = position[axis];
-                }
-            }
-            block.ids[lane] = first_id + triangle;
+            self.blocks[at].set_lane(lane, &triangles[triangle as usize]);
+            self.blocks[at].ids[lane] = first_id + triangle;
+            self.filled[at] += 1;
             count += 1;
         }
         LEAF | (first as u32) << 3 | (count.div_ceil(WIDTH) - 1) as u32

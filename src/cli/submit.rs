@@ -45,8 +45,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", requires = "trajectory", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..))]
     chunk: u32,
     /// Tasks among which the rays per pixel are shared
-    #[arg(long, value_name = "N", conflicts_with = "trajectory", required_unless_present = "trajectory", conflicts_with_all = ["target_error", "stop_at", "filter"], value_parser = clap::value_parser!(u32).range(1..))]
-    ranges: Option<u32>,
+    #[arg(long, value_name = "N", conflicts_with = "trajectory", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
+    ranges: u32,
     /// Poses of the frames, as `mixray sequence` takes them
     #[arg(long, value_name = "FILE", requires = "frames")]
     trajectory: Option<PathBuf>,
@@ -158,6 +158,11 @@ impl Arguments {
 
 /// A still: each task takes some of every pixel's rays.
 fn rays_job(arguments: &Arguments, matches: &ArgMatches, folder: &Path) -> Result<Job, Failure> {
+    let goal = &arguments.flags.goal;
+    if goal.filter.is_some() || goal.goal(None)?.is_some() {
+        let message = "--target-error, --stop-at and --filter look at all rays of a picture; expected the frames of a video (--trajectory), or a number of rays to share; leave them out";
+        return Err(Failure(message.to_owned()));
+    }
     let mut scene = arguments.flags.scene.load(&arguments.scene)?;
     for warning in &scene.warnings {
         say("warning", warning);
@@ -170,8 +175,7 @@ fn rays_job(arguments: &Arguments, matches: &ArgMatches, folder: &Path) -> Resul
     scene.settings.apply(&arguments.flags.overrides());
     let scene_file = Word::Shot(format!("{SCENE}/{}", bundle.scene_file()));
     let mut job = arguments.job(&scene.name, "Rays");
-    let count = arguments.ranges.unwrap_or(1);
-    job.parts = even(scene.settings.rays_per_pixel, count);
+    job.parts = even(scene.settings.rays_per_pixel, arguments.ranges);
     job.task = vec![Word::text("render"), scene_file.clone()];
     job.task.extend([Word::text("--range"), Word::Part]);
     job.task.extend([Word::text("-o"), Word::PartFile]);

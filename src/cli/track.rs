@@ -10,7 +10,7 @@ use super::threads::ThreadsFlag;
 use super::track_values::{Chosen, Gamma, family, flatness, gamma};
 use super::values::length;
 use super::{Failure, Outcome};
-use crate::output::{check_writable_as, write_text};
+use crate::output::{check_writable, check_writable_as, extension_among, write_bytes, write_text};
 use crate::scene::trajectory::{Focal, read_intrinsics};
 use crate::tracking::{Flatness, Lens, Target, TrackOptions, read_board, track};
 
@@ -65,7 +65,7 @@ pub(super) struct Arguments {
     /// A scene to begin with: the board's plane, and a box on it
     #[arg(long, value_name = "OUT.toml")]
     scene: Option<PathBuf>,
-    /// Tracks nothing, and writes this board to --output as an SVG to print
+    /// Tracks nothing, and writes this board to --output as an SVG or a PDF to print
     #[arg(long, value_name = "BOARD.toml", conflicts_with_all = ["video", "board", "marker_size"])]
     print_board: Option<PathBuf>,
     #[command(flatten)]
@@ -76,9 +76,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     arguments.threads.start()?;
     match (&arguments.print_board, &arguments.video) {
         (Some(board), _) => {
-            check_writable_as(&arguments.output, "svg")?;
-            let svg = read_board(board)?.svg()?;
-            write_text(&arguments.output, &svg)?;
+            let output = &arguments.output;
+            check_writable(output)?;
+            let extension = extension_among(output, &["svg", "pdf"])?;
+            let sheet = read_board(board)?.sheet()?;
+            match extension {
+                Some("pdf") => write_bytes(output, &sheet.pdf())?,
+                _ => write_text(output, &sheet.svg())?,
+            }
         }
         (None, Some(video)) => run_on(video, arguments)?,
         (None, None) => unreachable!("clap asks for one of them"),

@@ -18,5 +18,5 @@ mod tiles;
 pub mod vertex;
 
 pub use backdrop::backdrop_share;
-pub use pilot::{pilot, pilot_steps};
-pub use surfaces::diffuse_surfaces;
+pub use pilot::{LensGrid, pilot, pilot_steps};
+pub use surfaces::{diffuse_surfaces, diffuse_surfaces_of_pinhole};

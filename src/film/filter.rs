@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Film, PixelSums, Sum3};
-use crate::math::luminance;
+use crate::math::{exp_, luminance};
 
 /// The real surface that a pixel's rays meet, mean over the lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,16 +23,19 @@ pub struct RealSurface {
     pub albedo: Vec3,
 }
 
-/// Spacing of the taps doubles from 1 pixel; the last level reaches 32.
+/// Spacing of the taps doubles from 1 pixel; the last level reaches 16.
 const LEVELS: u32 = 5;
-const KERNEL: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
-/// Pixels to either side whose values tell a pixel's variance.
-const NEAR: i32 = 3;
+/// By distance from the middle, in taps.
+const KERNEL: [f32; 2] = [1.0 / 2.0, 1.0 / 4.0];
+/// Where the pixels lie whose values tell a pixel's variance: rows and columns off its own.
+const NEAR: [i32; 3] = [-2, 0, 2];
 /// Distance from the surface's plane, relative to its depth, at which a tap has fallen to 1/e.
 const PLANE_TOLERANCE: f32 = 0.01;
 const NORMAL_POWER: i32 = 32;
 /// Standard deviations of brightness at which a tap has fallen to 1/e.
 const DEVIATIONS: f32 = 3.0;
+/// A tap that has fallen to less than exp of this counts for nothing.
+const LEAST_EXPONENT: f32 = -12.0;
 /// Albedo is taken to be no less.
 const LEAST_ALBEDO: f32 = 0.01;
 /// With fewer samples a pixel's own tell no variance, and its neighbours' spread has to.
@@ -40,34 +43,45 @@ const ENOUGH_SAMPLES: u32 = 4;
 
 /// The film with its difference smoothed where `surfaces` (one a pixel) knows a diffuse real surface and samples met it.
 pub fn filter_difference(film: &Film, surfaces: &[Option<RealSurface>]) -> Film {
-    let canvas = Canvas {
-        width: film.width as i32,
-        height: film.height as i32,
-        surfaces: (film.pixels.iter().zip(surfaces))
-            .map(|(sums, surface)| surface.filter(|_| sums.m < sums.n))
-            .collect(),
-    };
-    let light: Vec<Vec3> = canvas.each(|pixel, surface| {
-        let sums = film.sums(pixel);
-        (sums.diff.value() / real_samples(&sums)).as_vec3() / divisor(surface)
-    });
-    let own: Vec<f32> =
-        canvas.each(|pixel, surface| own_variance(&film.sums(pixel), divisor(surface)));
-    let mut variance: Vec<f32> =
-        canvas.each(|pixel, surface| canvas.variance(film, pixel, surface, &light, &own));
-    let mut light = light;
-    for level in 0..LEVELS {
-        let smooth = canvas.blurred(&variance);
-        let both: Vec<(Vec3, f32)> = canvas.each(|pixel, surface| {
-            canvas.level(pixel, surface, 1 << level, &light, &variance, &smooth)
-        });
-        (light, variance) = both.into_iter().unzip();
-    }
     let mut out = film.clone();
     // What photons brought is smoothed with the rest.
     out.set_photons(false);
-    for (pixel, sums) in out.pixels.iter_mut().enumerate() {
-        *sums = film.sums(pixel);
+    if !film.splats.is_empty() {
+        for (pixel, sums) in out.pixels.iter_mut().enumerate() {
+            *sums = film.sums(pixel);
+        }
+    }
+    let canvas = Canvas {
+        width: film.width as i32,
+        height: film.height as i32,
+        surfaces: (out.pixels.iter().zip(surfaces))
+            .map(|(sums, surface)| surface.filter(|_| sums.m < sums.n))
+            .collect(),
+    };
+    let pixels = &out.pixels;
+    let mut light: Vec<Vec3> = canvas.each(|place, surface| {
+        let sums = &pixels[place.pixel];
+        (sums.diff.value() / real_samples(sums)).as_vec3() / divisor(surface)
+    });
+    let brightness = brightness_of(&light);
+    let own: Vec<f32> =
+        canvas.each(|place, surface| own_variance(&pixels[place.pixel], divisor(surface)));
+    let variance: Vec<f32> = canvas.each(|place, surface| {
+        let by_samples = pixels[place.pixel].n >= ENOUGH_SAMPLES;
+        canvas.variance(place, surface, by_samples, &brightness, &own)
+    });
+    let mut variance = canvas.blurred(&variance);
+    for level in 0..LEVELS {
+        let brightness = brightness_of(&light);
+        let both: Vec<(Vec3, f32)> = canvas.each(|place, surface| {
+            let values = Values {
+                light: &light,
+                brightness: &brightness,
+                variance: &variance,
+            };
+            canvas.level(place, surface, 1 << level, &values)
+        });
+        (light, variance) = both.into_iter().unzip();
     }
     out.pixels
         .par_iter_mut()
@@ -83,6 +97,10 @@ pub fn filter_difference(film: &Film, surfaces: &[Option<RealSurface>]) -> Film 
             }
         });
     out
+}
+
+fn brightness_of(light: &[Vec3]) -> Vec<f32> {
+    light.iter().map(|light| luminance(*light)).collect()
 }
 
 fn real_samples(sums: &PixelSums) -> f64 {
@@ -112,18 +130,44 @@ struct Canvas {
     surfaces: Vec<Option<RealSurface>>,
 }
 
+/// A pixel of the canvas.
+#[derive(Clone, Copy)]
+struct Place {
+    x: i32,
+    y: i32,
+    pixel: usize,
+}
+
+/// What a level of the wavelet reads, by pixel.
+struct Values<'a> {
+    light: &'a [Vec3],
+    /// Its luminance.
+    brightness: &'a [f32],
+    variance: &'a [f32],
+}
+
 impl Canvas {
     /// A value for each pixel; the default where there is nothing to filter.
-    fn each<T: Default + Send>(&self, f: impl Fn(usize, &RealSurface) -> T + Sync) -> Vec<T> {
-        let each = self.surfaces.par_iter().enumerate();
-        each.map(|(pixel, surface)| surface.as_ref().map_or_else(T::default, |s| f(pixel, s)))
-            .collect()
+    fn each<T: Default + Send>(&self, f: impl Fn(Place, &RealSurface) -> T + Sync) -> Vec<T> {
+        let width = self.width as usize;
+        let rows = self.surfaces.par_chunks(width).enumerate();
+        rows.flat_map_iter(|(y, row)| {
+            let f = &f;
+            row.iter().enumerate().map(move |(x, surface)| {
+                let place = Place {
+                    x: x as i32,
+                    y: y as i32,
+                    pixel: y * width + x,
+                };
+                surface.as_ref().map_or_else(T::default, |s| f(place, s))
+            })
+        })
+        .collect()
     }
 
-    /// The pixels this far away that lie on the picture and are filtered too.
-    fn neighbour(&self, pixel: usize, dx: i32, dy: i32) -> Option<(usize, &RealSurface)> {
-        let x = pixel as i32 % self.width + dx;
-        let y = pixel as i32 / self.width + dy;
+    /// The pixel this far away, if it lies on the picture and is filtered too.
+    fn neighbour(&self, from: Place, dx: i32, dy: i32) -> Option<(usize, &RealSurface)> {
+        let (x, y) = (from.x + dx, from.y + dy);
         if x < 0 || y < 0 || x >= self.width || y >= self.height {
             return None;
         }
@@ -134,30 +178,28 @@ impl Canvas {
     /// Variance of a pixel's brightness: the neighbourhood's mean of what samples tell, or its spread where they are too few.
     fn variance(
         &self,
-        film: &Film,
-        pixel: usize,
+        place: Place,
         surface: &RealSurface,
-        light: &[Vec3],
+        by_samples: bool,
+        brightness: &[f32],
         own: &[f32],
     ) -> f32 {
-        let by_samples = film.pixels[pixel].n >= ENOUGH_SAMPLES;
         let (mut weights, mut sum, mut squares) = (0.0, 0.0, 0.0);
-        for dy in -NEAR..=NEAR {
-            for dx in -NEAR..=NEAR {
-                let Some((at, other)) = self.neighbour(pixel, dx, dy) else {
+        for dy in NEAR {
+            for dx in NEAR {
+                let Some((at, other)) = self.neighbour(place, dx, dy) else {
                     continue;
                 };
                 if by_samples && own[at] < 0.0 {
                     continue;
                 }
                 let weight = same_surface(surface, other);
-                let brightness = luminance(light[at]);
                 weights += weight;
                 if by_samples {
                     sum += weight * own[at];
                 } else {
-                    sum += weight * brightness;
-                    squares += weight * brightness * brightness;
+                    sum += weight * brightness[at];
+                    squares += weight * brightness[at] * brightness[at];
                 }
             }
         }
@@ -174,11 +216,11 @@ impl Canvas {
 
     /// 3 x 3 binomial, so that one pixel's lucky variance does not shut it off.
     fn blurred(&self, variance: &[f32]) -> Vec<f32> {
-        self.each(|pixel, _| {
+        self.each(|place, _| {
             let (mut weights, mut sum) = (0.0, 0.0);
             for dy in -1..=1_i32 {
                 for dx in -1..=1_i32 {
-                    if let Some((at, _)) = self.neighbour(pixel, dx, dy) {
+                    if let Some((at, _)) = self.neighbour(place, dx, dy) {
                         let weight = 1.0 / (1 << (dx.abs() + dy.abs())) as f32;
                         weights += weight;
                         sum += weight * variance[at];
@@ -192,38 +234,55 @@ impl Canvas {
     /// One level of the wavelet: light and its variance.
     fn level(
         &self,
-        pixel: usize,
+        place: Place,
         surface: &RealSurface,
         step: i32,
-        light: &[Vec3],
-        variance: &[f32],
-        smooth: &[f32],
+        values: &Values<'_>,
     ) -> (Vec3, f32) {
-        let here = luminance(light[pixel]);
-        let deviation = DEVIATIONS * smooth[pixel].sqrt() + 1e-6;
-        let (mut weights, mut sum, mut spread) = (0.0, Vec3::ZERO, 0.0);
-        for dy in -2..=2_i32 {
-            for dx in -2..=2_i32 {
-                let Some((at, other)) = self.neighbour(pixel, dx * step, dy * step) else {
+        let here = values.brightness[place.pixel];
+        let variance = values.variance[place.pixel];
+        let per_deviation = 1.0 / (DEVIATIONS * variance.sqrt() + 1e-6);
+        let mut weights = KERNEL[0] * KERNEL[0];
+        let mut sum = values.light[place.pixel] * weights;
+        let mut spread = variance * weights * weights;
+        for dy in -1..=1_i32 {
+            for dx in -1..=1_i32 {
+                let Some((at, other)) = self.neighbour(place, dx * step, dy * step) else {
                     continue;
                 };
+                if at == place.pixel {
+                    continue;
+                }
+                let exponent = plane_exponent(surface, other)
+                    - (values.brightness[at] - here).abs() * per_deviation;
+                if exponent < LEAST_EXPONENT {
+                    continue;
+                }
                 let [kx, ky] = [dx, dy].map(|d| KERNEL[d.unsigned_abs() as usize]);
-                let off = (luminance(light[at]) - here).abs() / deviation;
-                let weight = kx * ky * same_surface(surface, other) * (-off).exp();
+                let weight = kx * ky * same_way(surface, other) * exp_(exponent);
                 weights += weight;
-                sum += light[at] * weight;
-                spread += variance[at] * weight * weight;
+                sum += values.light[at] * weight;
+                spread += values.variance[at] * weight * weight;
             }
         }
         (sum / weights, spread / (weights * weights))
     }
 }
 
+/// 1 where both face the same way, towards 0 elsewhere.
+fn same_way(a: &RealSurface, b: &RealSurface) -> f32 {
+    a.normal.dot(b.normal).max(0.0).powi(NORMAL_POWER)
+}
+
+/// 0 where the second lies in the first one's plane, negative elsewhere.
+fn plane_exponent(a: &RealSurface, b: &RealSurface) -> f32 {
+    let off_plane = a.normal.dot(b.position - a.position).abs();
+    -off_plane / (PLANE_TOLERANCE * a.depth_m.max(f32::MIN_POSITIVE))
+}
+
 /// 1 where both lie in one plane and face the same way, towards 0 elsewhere.
 pub(super) fn same_surface(a: &RealSurface, b: &RealSurface) -> f32 {
-    let off_plane = a.normal.dot(b.position - a.position).abs();
-    let normal = a.normal.dot(b.normal).max(0.0).powi(NORMAL_POWER);
-    normal * (-off_plane / (PLANE_TOLERANCE * a.depth_m.max(f32::MIN_POSITIVE))).exp()
+    same_way(a, b) * plane_exponent(a, b).exp()
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@
 
 use glam::Vec3;
 
+use super::environment_table::interval_of;
 use crate::math::{PI, atan2_, luminance, safe_sqrt, sincos_2pi};
 use crate::packed::{Frame, PackedScene};
 use crate::shared::shared;
@@ -158,18 +159,11 @@ fn env_corner(scene: &PackedScene, i: u32, j: u32) -> f32 {
     luminance(env_texel(scene, i, j))
 }
 
-/// Last index i with cdf[base + i] <= u among `count` intervals of the environment's.
+/// Last index i with cdf[base + i] <= u among `count` intervals of the environment's. (The shader halves: it has arithmetic to spare, but no memory.)
 fn find_interval(scene: &PackedScene, base: u32, count: u32, u: f32) -> u32 {
-    let (mut low, mut high) = (0, count);
-    while high - low > 1 {
-        let middle = (low + high) / 2;
-        if scene.env_cdf[(base + middle) as usize] <= u {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    low
+    let entries = base as usize..=(base + count) as usize;
+    let (cdf, starts) = (&scene.env_cdf[entries.clone()], &scene.env_starts[entries]);
+    interval_of(cdf, starts, u)
 }
 
 /// Where u lies in the interval from entry `at` of the distributions to the next.

@@ -10,6 +10,8 @@ pub struct EnvironmentTable {
     /// Marginal over the height + 1 rows (height + 2 entries from 0 to 1), then for each row the conditional over its width columns
     /// (width + 1 entries).
     pub cdf: Vec<f32>,
+    /// Where [`interval_of`] begins to look, laid out as `cdf`.
+    pub starts: Vec<u32>,
     /// 1 / integral of the cells' mean luminance over the sphere; 0 for a black map.
     pub normaliser: f32,
     /// Mean luminance over the sphere.
@@ -48,8 +50,13 @@ pub fn environment_table(width: u32, height: u32, texels: &[f32]) -> Environment
     let mut cdf = vec![0.0_f32; rows + 1];
     fill_cdf(&mut cdf, &row_sums);
     cdf.extend_from_slice(&conditionals);
+    let mut starts = starts_of(&cdf[..=rows]);
+    for conditional in conditionals.chunks(w + 1) {
+        starts.extend(starts_of(conditional));
+    }
     EnvironmentTable {
         cdf,
+        starts,
         normaliser: if integral > 0.0 {
             (1.0 / integral) as f32
         } else {
@@ -72,4 +79,68 @@ fn fill_cdf(cdf: &mut [f32], weights: &[f64]) {
         };
     }
     cdf[weights.len()] = 1.0;
+}
+
+/// The part of 0..1, cut into as many as there are intervals, that a number lies in. Monotonic, and the same wherever it is asked.
+fn part_of(u: f32, intervals: usize) -> usize {
+    (u * intervals as f32) as usize
+}
+
+/// For each part of 0..1 the last interval that begins in an earlier one.
+fn starts_of(cdf: &[f32]) -> Vec<u32> {
+    let intervals = cdf.len() - 1;
+    let mut interval = 0;
+    (0..=intervals)
+        .map(|part| {
+            while interval + 1 < intervals && part_of(cdf[interval + 1], intervals) < part {
+                interval += 1;
+            }
+            interval as u32
+        })
+        .collect()
+}
+
+/// Last interval i with cdf\[i\] <= u, for u in 0..1: the cutpoint method (Chen and Asau 1974), two steps on average where a binary search
+/// takes one for each bit.
+pub fn interval_of(cdf: &[f32], starts: &[u32], u: f32) -> u32 {
+    let intervals = cdf.len() - 1;
+    let mut interval = starts[part_of(u, intervals)] as usize;
+    while interval + 1 < intervals && cdf[interval + 1] <= u {
+        interval += 1;
+    }
+    interval as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_is_the_last_that_begins_at_or_before_a_number() {
+        let black = vec![0.0; 7];
+        let peak = (0..300).map(|i| if i == 217 { 1e6 } else { 1e-3 });
+        let gaps = (0..129).map(|i| if i % 5 < 3 { 0.0 } else { f64::from(i) });
+        let ramp = (1..=64).map(f64::from);
+        for weights in [
+            black,
+            peak.collect(),
+            gaps.collect(),
+            ramp.collect(),
+            vec![2.0],
+        ] {
+            let mut cdf = vec![0.0; weights.len() + 1];
+            fill_cdf(&mut cdf, &weights);
+            let starts = starts_of(&cdf);
+            let spread = (0..1000).map(|i| i as f32 / 1000.0);
+            let around = cdf.iter().flat_map(|&c| [c.next_down(), c, c.next_up()]);
+            let numbers = spread.chain(around).filter(|u| (0.0..1.0).contains(u));
+            for u in numbers {
+                let wanted = cdf[..weights.len()].partition_point(|&c| c <= u) - 1;
+                assert_eq!(interval_of(&cdf, &starts, u), wanted as u32, "{u}");
+            }
+            let late: Vec<_> = starts.iter().map(|s| s + 1).collect();
+            let is_noticed = weights.len() == 1 || interval_of(&cdf, &late, 0.0) != 0;
+            assert!(is_noticed, "control: it must not begin too late");
+        }
+    }
 }

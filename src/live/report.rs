@@ -82,6 +82,8 @@ pub struct LiveWindow {
     pub frames: LiveCounts,
     /// From a frame's arrival to its output.
     pub age: AgeSpread,
+    /// The part of it in which the frame was not worked on.
+    pub wait: AgeSpread,
     /// Of rendered frames, mean.
     pub rays_per_pixel: f64,
     /// Of processing, without waiting: mean of a frame.
@@ -165,6 +167,7 @@ pub(super) struct Tally {
 #[derive(Debug, Default)]
 struct Sums {
     ages: Ages,
+    waits: Ages,
     rays_per_pixel: u64,
     work_secs: f64,
     without_pose: BTreeMap<String, u64>,
@@ -177,6 +180,7 @@ impl Sums {
             seconds,
             frames,
             age: self.ages.spread(),
+            wait: self.waits.spread(),
             rays_per_pixel: self.rays_per_pixel as f64 / rendered,
             work_ms: 1e3 * self.work_secs / self.ages.len().max(1) as f64,
             without_pose: self.without_pose.clone(),
@@ -185,6 +189,7 @@ impl Sums {
 
     fn extend(&mut self, other: &Self) {
         self.ages.extend(&other.ages);
+        self.waits.extend(&other.waits);
         self.rays_per_pixel += other.rays_per_pixel;
         self.work_secs += other.work_secs;
         for (why, count) in &other.without_pose {
@@ -223,6 +228,7 @@ impl Tally {
         };
         self.window.rays_per_pixel += u64::from(rays_per_pixel);
         self.window.ages.add(age_secs);
+        self.window.waits.add(age_secs - seconds.total());
         self.window.work_secs += seconds.total();
         self.seconds.add(seconds);
     }

@@ -2,6 +2,7 @@
 
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
+use rayon::prelude::*;
 
 use super::target::write_atomically;
 use super::{OutputError, Target};
@@ -99,11 +100,11 @@ struct Encoding<T> {
 }
 
 /// In the photograph's colours.
-fn codes<T: Copy>(
+fn codes<T: Copy + Send>(
     picture: &Picture,
     photo: Option<&Photo>,
     encode: Encoding<T>,
-    own_code: impl Fn(&EncodedPhoto, usize) -> Option<[T; 3]>,
+    own_code: impl Fn(&EncodedPhoto, usize) -> Option<[T; 3]> + Sync,
 ) -> Vec<[T; 3]> {
     let profile = photo.and_then(|photo| photo.tags.profile.as_deref());
     let of_linear = |value: [f32; 3]| match profile {
@@ -112,7 +113,7 @@ fn codes<T: Copy>(
     };
     picture
         .linear
-        .iter()
+        .par_iter()
         .enumerate()
         .map(|(pixel, value)| {
             photo

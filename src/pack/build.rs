@@ -64,12 +64,37 @@ impl PackedScene {
         anchor: DVec3,
         watcher: &Watcher<'_>,
     ) -> Result<Self, PackError> {
+        Self::build_into(Self::empty(), scene, anchor, watcher)
+    }
+
+    /// [`PackedScene::build_at`] with looser spheres about the virtual objects, each with its own: [`PackedScene::move_virtual`] then costs little.
+    ///
+    /// # Errors
+    /// As [`PackedScene::build`].
+    pub fn build_draft(
+        scene: &Scene,
+        anchor: DVec3,
+        watcher: &Watcher<'_>,
+    ) -> Result<Self, PackError> {
+        let draft = Self {
+            object_covers: Some(Vec::new()),
+            ..Self::empty()
+        };
+        Self::build_into(draft, scene, anchor, watcher)
+    }
+
+    fn build_into(
+        empty: Self,
+        scene: &Scene,
+        anchor: DVec3,
+        watcher: &Watcher<'_>,
+    ) -> Result<Self, PackError> {
         let [in_real, in_virtual] = [Side::Real, Side::Virtual].map(|side| triangles(scene, side));
         let steps = (1 + STEPS_OF_A_TREE) * (in_real + in_virtual);
         let meter = Meter::begin(watcher, Phase::Trees, steps);
         let mut packed = Self {
             anchor_m: anchor.to_array(),
-            ..Self::empty()
+            ..empty
         };
         packed.set_camera(scene);
         packed.set_settings(scene);
@@ -90,19 +115,39 @@ impl PackedScene {
     /// # Errors
     /// As [`PackedScene::build`].
     pub fn rebuild_virtual(&mut self, scene: &Scene) -> Result<(), PackError> {
+        self.place_virtual(scene)?;
         let first = self.frame.real_triangle_count;
-        self.triangles.truncate(first as usize);
+        self.virtual_bvh = WorldBvh::build(&self.corners(first as usize), first)?;
+        self.rebuild_moving(scene)
+    }
+
+    /// The same where objects were moved: the tree is refitted, which every ray takes as it takes a new one, but more slowly the farther they have
+    /// come.
+    ///
+    /// # Errors
+    /// As [`PackedScene::build`].
+    pub fn move_virtual(&mut self, scene: &Scene) -> Result<(), PackError> {
+        self.place_virtual(scene)?;
+        let first = self.frame.real_triangle_count;
+        let corners = self.corners(first as usize);
+        if !self.virtual_bvh.refit(&corners)? {
+            self.virtual_bvh = WorldBvh::build(&corners, first)?;
+        }
+        self.rebuild_moving(scene)
+    }
+
+    /// Puts what rests of the virtual world where it is, and the spheres about it.
+    fn place_virtual(&mut self, scene: &Scene) -> Result<(), PackError> {
+        let first = self.frame.real_triangle_count as usize;
+        self.triangles.truncate(first);
         self.vertices.truncate(self.real_vertex_count);
         self.add_world(scene, Side::Virtual)?;
         self.resting = Resting {
             triangles: self.triangles.len(),
             vertices: self.vertices.len(),
         };
-        let corners = self.corners(first as usize);
-        self.resting_cover = Cover::of(&corners, MAX_SPHERES);
-        self.resting_smooth_cover = self.cover_smooth(first as usize..self.triangles.len());
-        self.virtual_bvh = WorldBvh::build(&corners, first)?;
-        self.rebuild_moving(scene)
+        self.cover_resting(scene, first);
+        Ok(())
     }
 
     /// Packs what moves of the virtual objects, and all lights, anew: the cost is that of the moving triangles, and of a look at every vertex.
@@ -134,7 +179,8 @@ impl PackedScene {
         self.vertices.truncate(self.resting.vertices);
         self.add_objects(scene, Side::Virtual, true)?;
         let cover = Cover::of(&self.corners(self.resting.triangles), MAX_SPHERES);
-        let spheres = Cover::spheres(&[&self.resting_cover, &cover], MAX_SPHERES);
+        let covers: Vec<&Cover> = self.resting_covers.iter().chain([&cover]).collect();
+        let spheres = Cover::spheres(&covers, MAX_SPHERES);
         self.frame.sphere_count = spheres.len() as u32;
         self.frame.spheres = [[0.0; 4]; MAX_SPHERES];
         self.frame.spheres[..spheres.len()].copy_from_slice(&spheres);
@@ -221,6 +267,7 @@ impl PackedScene {
                     self.env_mean_luminance,
                 );
                 self.env_cdf = table.cdf;
+                self.env_starts = table.starts;
             }
         }
     }
@@ -386,7 +433,7 @@ impl PackedScene {
         Vec3::new(x, y, z)
     }
 
-    fn corners(&self, first_triangle: usize) -> Vec<[Vec3; 3]> {
+    pub(super) fn corners(&self, first_triangle: usize) -> Vec<[Vec3; 3]> {
         self.triangles[first_triangle..]
             .iter()
             .map(|t| t.vertices.map(|v| self.position(v)))

@@ -1,6 +1,7 @@
 //! From a scene, f64, to what backends read ([`PackedScene`](crate::packed::PackedScene)), f32.
 
 mod backdrop;
+mod bounds;
 mod build;
 pub mod camera;
 mod facets;

@@ -7,11 +7,13 @@ use glam::Vec3;
 use crate::accel::Cover;
 use crate::material::{DELTA_ALPHA, POLISHED_ALPHA, transmits_unblurred};
 use crate::math::luminance;
+use crate::packed::materials::MaterialKey;
 use crate::packed::{
     LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, LIGHT_TRIANGLE,
     Light, MATERIAL_LAMBERTIAN, MATERIAL_QUAD_LIGHT, MATERIAL_TEXTURED, MATERIAL_THIN_WALLED,
     MATERIAL_UNLIT, MAX_PHOTON_SPHERES, Material, NONE, PackedScene, TracedEnvironment, xyz,
 };
+use crate::scene::{Instance, Object};
 
 /// Light of the environment brighter than so many times its mean is sent as photons: the sun, lamps and windows. The eye's paths find the rest
 /// well.
@@ -36,13 +38,25 @@ impl PackedScene {
         Cover::of(&corners, MAX_PHOTON_SPHERES)
     }
 
+    /// Whether a part of an object that is packed has a smooth surface.
+    pub(super) fn is_smooth_part(&self, object: &Object, part: &Instance) -> bool {
+        let key = MaterialKey::new(
+            &part.material,
+            object.self_shadow_bias_m,
+            object.albedo_from_photo,
+        );
+        let index = self.material_table.known(&key);
+        index.is_some_and(|index| is_smooth_somewhere(self, &self.materials[index as usize]))
+    }
+
     /// Fills the frame's spheres about smooth virtual surfaces and the lights' shares of the photons. Wants the lights packed.
     pub(super) fn pack_photons(&mut self) {
         self.frame.photon_sphere_count = 0;
         self.frame.photon_spheres = [[0.0; 4]; MAX_PHOTON_SPHERES];
         self.frame.env_traced_above = f32::INFINITY;
         let moving = self.cover_smooth(self.resting.triangles..self.triangles.len());
-        let spheres = Cover::spheres(&[&self.resting_smooth_cover, &moving], MAX_PHOTON_SPHERES);
+        let covers: Vec<&Cover> = (self.resting_smooth_covers.iter().chain([&moving])).collect();
+        let spheres = Cover::spheres(&covers, MAX_PHOTON_SPHERES);
         self.frame.photon_spheres[..spheres.len()].copy_from_slice(&spheres);
         let large = self.large_lights(&spheres);
         let powers: Vec<f64> = (self.lights.iter().zip(large))

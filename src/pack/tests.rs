@@ -395,3 +395,38 @@ fn photons_leave_large_lamps_to_the_eye() {
     assert_eq!(large.frame.photon_sphere_count, 0);
     assert_eq!(large.lights[0].photon_pdf, 0.0);
 }
+
+/// What a draft packs of a moved object is what it packs of the scene as it then is, and the object's spheres hold it. Control: the scene before.
+#[test]
+fn a_draft_moves_an_object_as_if_it_had_stood_there() {
+    let mut scene = two_objects(DVec3::ZERO);
+    let beside = tetrahedron(Side::Virtual, DVec3::new(-0.5, 0.1, -1.5), DVec3::ONE);
+    scene.objects.insert(1, beside);
+    let draft = |scene: &Scene| {
+        PackedScene::build_draft(scene, DVec3::ZERO, &Watcher::none()).expect("packs")
+    };
+    let mut moved = draft(&scene);
+    let before = draft(&scene);
+    scene.objects[0].world_from_object = DMat4::from_translation(DVec3::new(0.4, -0.3, -2.5))
+        * DMat4::from_quat(DQuat::from_rotation_z(1.1))
+        * DMat4::from_scale(DVec3::new(0.5, 2.0, 1.5));
+    moved.move_virtual(&scene).expect("packs");
+    let bytes = |packed: &PackedScene| -> [Vec<u8>; 3] {
+        [
+            bytemuck::cast_slice(&packed.vertices).to_vec(),
+            bytemuck::cast_slice(&packed.triangles).to_vec(),
+            bytemuck::bytes_of(&packed.frame).to_vec(),
+        ]
+    };
+    assert_eq!(bytes(&moved), bytes(&draft(&scene)));
+    assert_ne!(bytes(&moved), bytes(&before), "control");
+    let is_held = |packed: &PackedScene, p: Vec3| {
+        let spheres = &packed.frame.spheres[..packed.frame.sphere_count as usize];
+        let inside = |s: &[f32; 4]| (p - xyz(*s)).length() <= s[3];
+        spheres.iter().any(inside)
+    };
+    let first = moved.real_vertex_count as u32;
+    let mut points = (first..moved.vertices.len() as u32).map(|v| moved.position(v));
+    assert!(points.clone().all(|p| is_held(&moved, p)));
+    assert!(!points.all(|p| is_held(&before, p)), "control");
+}

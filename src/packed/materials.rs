@@ -95,6 +95,11 @@ impl MaterialTable {
         index
     }
 
+    /// Index of a material that is packed already.
+    pub fn known(&self, key: &MaterialKey) -> Option<u32> {
+        self.materials.get(key).map(|(_, index)| *index)
+    }
+
     fn pack(
         &mut self,
         packed: &mut PackedScene,

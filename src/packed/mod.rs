@@ -34,6 +34,8 @@ pub struct PackedScene {
     pub env_texels: Vec<f32>,
     /// Cumulative distributions of the environment's cells (see `light::environment_table::EnvironmentTable`).
     pub env_cdf: Vec<f32>,
+    /// `EnvironmentTable::starts`, for the CPU alone.
+    pub env_starts: Vec<u32>,
     /// For `albedo = "from-photo"`, empty where unused: albedo of the photograph's pixels and the depth (metres along the axis) it was seen
     /// at, then for each scene object its patches, [`records::PHOTO_PATCHES`] pairs: mean albedo of the pixels that see a part of it and how many
     /// they are; their mean position, metres, and mean squared distance from it.
@@ -54,9 +56,11 @@ pub struct PackedScene {
     pub(crate) real_vertex_count: usize,
     pub(crate) resting: Resting,
     /// Over the virtual triangles that rest.
-    pub(crate) resting_cover: Cover,
+    pub(crate) resting_covers: Vec<Cover>,
     /// Over those of them that are smooth.
-    pub(crate) resting_smooth_cover: Cover,
+    pub(crate) resting_smooth_covers: Vec<Cover>,
+    /// Of a draft: the virtual objects' that were found so far.
+    pub(crate) object_covers: Option<Vec<ObjectCover>>,
     pub(crate) env_mean_luminance: f64,
     pub(crate) env_traced: TracedEnvironment,
     /// Photons traced for every ray per pixel; 0 where none are.
@@ -70,6 +74,17 @@ pub struct TracedEnvironment {
     pub above: f64,
     /// Luminance of what lies above it, mean over the sphere.
     pub mean_radiance: f64,
+}
+
+/// Spheres about a virtual object, in its own space.
+pub(crate) struct ObjectCover {
+    /// Index in the scene.
+    pub object: usize,
+    /// Of its triangles that rest.
+    pub triangles: usize,
+    pub whole: Cover,
+    /// About what of it is smooth.
+    pub smooth: Cover,
 }
 
 /// How many of a scene's triangles and vertices rest: those of animated virtual objects come after them.
@@ -96,6 +111,7 @@ impl PackedScene {
             lights: Vec::new(),
             env_texels: Vec::new(),
             env_cdf: Vec::new(),
+            env_starts: Vec::new(),
             photo_albedo: Vec::new(),
             guide: Vec::new(),
             facet_tables: Vec::new(),
@@ -106,8 +122,9 @@ impl PackedScene {
             material_table: materials::MaterialTable::default(),
             real_vertex_count: 0,
             resting: Resting::default(),
-            resting_cover: Cover::of(&[], MAX_SPHERES),
-            resting_smooth_cover: Cover::of(&[], MAX_PHOTON_SPHERES),
+            resting_covers: Vec::new(),
+            resting_smooth_covers: Vec::new(),
+            object_covers: None,
             env_mean_luminance: 0.0,
             env_traced: TracedEnvironment::default(),
             photons_per_ray: 0,

@@ -1,6 +1,6 @@
 //! Runs a script on the window's own code, without a display.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -22,6 +22,8 @@ use crate::stages::finish;
 
 /// Nothing that is waited for takes longer.
 const PATIENCE: Duration = Duration::from_secs(600);
+/// Between two frames while something is waited for, as on a screen: drawing more often would take the processors from what renders.
+const FRAME: Duration = Duration::from_millis(16);
 const SIZE: [f32; 2] = [1240.0, 760.0];
 
 /// A step that failed.
@@ -101,7 +103,7 @@ impl Window {
             if Instant::now() > end {
                 return Err(format!("{what} took longer than {} s", PATIENCE.as_secs()));
             }
-            sleep(Duration::from_millis(1));
+            sleep(FRAME);
         }
     }
 
@@ -382,27 +384,90 @@ impl Window {
                 self.wait_for_coarse()?;
             }
         }
+        let added = self.measure_files(&["glb", "gltf"], true)?;
+        let swapped = self.measure_files(&["png", "jpg", "jpeg", "webp"], false)?;
         let longest_ms = 1e3 * self.app().longest_frame.as_secs_f64();
         let latencies = self.session().renderers().latencies();
-        let mut table =
-            String::from("| edit | edits | median, ms | p95, ms |\n| --- | --- | --- | --- |\n");
-        for change in ["lens", "light", "object", "exposure or bounces"] {
-            let mut times: Vec<f64> = (latencies.iter())
-                .filter(|latency| latency.change == change && latency.level == Level::Coarse)
-                .map(|latency| 1e3 * latency.time.as_secs_f64())
-                .collect();
-            times.sort_by(f64::total_cmp);
-            if let Some(last) = times.len().checked_sub(1) {
-                let at = |share: f64| times[(last as f64 * share).round() as usize];
+        let mut table = String::from(
+            "| edit | edits | median, ms | p95, ms | of the processors, median, ms |\n| --- | --- | --- | --- | --- |\n",
+        );
+        let mut row = |name: &str, times: Option<Spread>, processors: Option<Spread>| {
+            if let Some(times) = times {
+                let processors =
+                    processors.map_or("".to_owned(), |p| format!("{:.0}", p.median_ms));
                 table += &format!(
-                    "| {change} | {} | {:.0} | {:.0} |\n",
-                    times.len(),
-                    at(0.5),
-                    at(0.95)
+                    "| {name} | {} | {:.0} | {:.0} | {processors} |\n",
+                    times.count, times.median_ms, times.p95_ms
                 );
             }
+        };
+        for change in ["lens", "light", "object", "exposure or bounces"] {
+            let of_change = || {
+                let all = latencies.iter();
+                all.filter(|latency| latency.change == change && latency.level == Level::Coarse)
+            };
+            let times = Spread::of(of_change().map(|latency| latency.time));
+            let processors = Spread::of(of_change().map(|latency| latency.processor_time));
+            row(change, times, processors);
         }
-        Ok(table + &format!("\nlongest frame of the window: {longest_ms:.0} ms\n"))
+        row("object added", Spread::of(added.into_iter()), None);
+        row("photograph swapped", Spread::of(swapped.into_iter()), None);
+        let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+        let load = load.split(' ').next().unwrap_or_default();
+        Ok(table
+            + &format!(
+                "\nlongest frame of the window: {longest_ms:.0} ms; load of the machine: {load}\n"
+            ))
+    }
+
+    /// From files that are dropped, one of the scene's own with such an ending, to the pictures that show them first; `undone`: each is taken out
+    /// again.
+    fn measure_files(&mut self, endings: &[&str], undone: bool) -> Result<Vec<Duration>, String> {
+        const FILES: usize = 5;
+        let loaded = self.session().loaded().ok_or("no scene is read")?;
+        let has_ending = |file: &&PathBuf| {
+            let ending = file.extension().map(|e| e.to_string_lossy().to_lowercase());
+            ending.is_some_and(|ending| endings.contains(&&*ending))
+        };
+        let Some(file) = loaded.scene.inputs.iter().find(has_ending).cloned() else {
+            return Ok(Vec::new());
+        };
+        let mut times = Vec::new();
+        for _ in 0..FILES {
+            let begin = Instant::now();
+            self.session_mut().take_file(&file, None);
+            self.wait_for_scene()?;
+            self.wait_for_coarse()?;
+            times.push(begin.elapsed());
+            if undone {
+                self.session_mut().undo();
+                self.wait_for_scene()?;
+                self.wait_for_coarse()?;
+            }
+        }
+        Ok(times)
+    }
+}
+
+/// Of some times.
+struct Spread {
+    count: usize,
+    median_ms: f64,
+    p95_ms: f64,
+}
+
+impl Spread {
+    /// `None` of none.
+    fn of(times: impl Iterator<Item = Duration>) -> Option<Self> {
+        let mut ms: Vec<f64> = times.map(|time| 1e3 * time.as_secs_f64()).collect();
+        ms.sort_by(f64::total_cmp);
+        let last = ms.len().checked_sub(1)?;
+        let at = |share: f64| ms[(last as f64 * share).round() as usize];
+        Some(Self {
+            count: ms.len(),
+            median_ms: at(0.5),
+            p95_ms: at(0.95),
+        })
     }
 }
 

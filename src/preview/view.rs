@@ -1,5 +1,6 @@
 //! What the window shows of a film: the picture, or one of its planes in false colours.
 
+use glam::Vec4;
 use rayon::prelude::*;
 
 use crate::film::{Picture, Planes};
@@ -134,11 +135,11 @@ pub fn over_photo(
 ) -> Picture {
     let [width, height] = size;
     // What is added, premultiplied, and how much of the photograph it hides.
-    let layer: Vec<[f32; 4]> = (0..small.linear.len())
+    let layer: Vec<Vec4> = (0..small.linear.len())
         .map(|i| {
             let ic = small_photo.map_or([0.0; 3], |photo| photo.linear[i]);
             let [r, g, b] = [0, 1, 2].map(|c| small.linear[i][c] - ic[c] * (1.0 - mask[i]));
-            [r, g, b, mask[i]]
+            Vec4::new(r, g, b, mask[i])
         })
         .collect();
     let (small_width, small_height) = (small.width as usize, small.height as usize);
@@ -150,17 +151,18 @@ pub fn over_photo(
         let first = at as usize;
         (first, (first + 1).min(count - 1), at - first as f32)
     };
+    let between = |a: Vec4, b: Vec4, share: f32| a * (1.0 - share) + b * share;
+    let columns: Vec<_> = (0..width)
+        .map(|x| neighbours((x as f32 + 0.5) * step_x, small_width))
+        .collect();
     let mut linear = vec![[0.0; 3]; width as usize * height as usize];
     (linear.par_chunks_mut(width as usize).enumerate()).for_each(|(y, row)| {
         let (y0, y1, v) = neighbours((y as f32 + 0.5) * step_y, small_height);
-        for (x, pixel) in row.iter_mut().enumerate() {
-            let (x0, x1, u) = neighbours((x as f32 + 0.5) * step_x, small_width);
-            let at = |x: usize, y: usize, c: usize| layer[y * small_width + x][c];
-            let [r, g, b, a] = [0, 1, 2, 3].map(|c| {
-                let above = at(x0, y0, c) * (1.0 - u) + at(x1, y0, c) * u;
-                let below = at(x0, y1, c) * (1.0 - u) + at(x1, y1, c) * u;
-                above * (1.0 - v) + below * v
-            });
+        let of_row = |y: usize| &layer[y * small_width..][..small_width];
+        let pairs = of_row(y0).iter().zip(of_row(y1));
+        let small: Vec<Vec4> = pairs.map(|(a, b)| between(*a, *b, v)).collect();
+        for ((x, pixel), &(x0, x1, u)) in row.iter_mut().enumerate().zip(&columns) {
+            let [r, g, b, a] = between(small[x0], small[x1], u).to_array();
             let ic = photo.map_or([0.0; 3], |photo| photo.linear[y * width as usize + x]);
             *pixel = [
                 r + ic[0] * (1.0 - a),

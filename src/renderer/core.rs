@@ -5,9 +5,10 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::backend::Backend;
+use super::photo_albedo::PhotoLight;
 use super::stopwatch::Stopwatch;
 use super::{RenderError, RendererOptions, Seconds, Skip};
-use crate::cpu;
+use crate::cpu::{self, LensGrid};
 use crate::film::Film;
 use crate::gpu::GpuError;
 use crate::pack::PackError;
@@ -18,6 +19,8 @@ use crate::work::{Meter, Phase, PhotonWork, Progress, RayCounts, Watcher, WorkLi
 pub(super) struct Core {
     pub scene: Scene,
     pub packed: PackedScene,
+    /// Of the frames of a video, and of a scene that is edited.
+    pub lens_grid: Option<LensGrid>,
     pub film: Film,
     pub backend: Backend,
     pub options: RendererOptions,
@@ -25,6 +28,8 @@ pub(super) struct Core {
     pub seconds: Seconds,
     /// Things the user should hear: fallbacks taken, values fitted.
     pub notes: Vec<String>,
+    /// Of a draft: other exposures and cameras make do with it.
+    pub photo_light: Option<PhotoLight>,
     /// Share of the light of virtual pixels that comes from the photograph as their backdrop.
     pub backdrop_share: Option<f64>,
     /// The picture's time.
@@ -34,13 +39,13 @@ pub(super) struct Core {
 impl Core {
     /// Packs the whole scene anew, anchored at its camera.
     pub fn pack(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
-        self.packed = PackedScene::build(&self.scene, watcher)?;
-        Ok(())
+        let anchor = self.scene.camera.world_from_camera.w_axis.truncate();
+        self.pack_at(anchor, watcher)
     }
 
     /// The same, anchored at a point of the world.
     pub fn pack_at(&mut self, anchor: DVec3, watcher: &Watcher<'_>) -> Result<(), PackError> {
-        self.packed = PackedScene::build_at(&self.scene, anchor, watcher)?;
+        self.packed = packed(&self.scene, anchor, &self.options, watcher)?;
         Ok(())
     }
 
@@ -50,6 +55,14 @@ impl Core {
         self.packed.rebuild_virtual(&self.scene)?;
         meter.end();
         Ok(())
+    }
+
+    /// Packs the virtual world anew after an object was moved.
+    pub fn pack_moved(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
+        match self.options.draft {
+            true => self.packed.move_virtual(&self.scene),
+            false => self.pack_virtual(watcher),
+        }
     }
 
     /// Packs anew what moves.
@@ -154,6 +167,19 @@ impl Core {
     pub fn count_render(&mut self, stopwatch: &Stopwatch) {
         self.seconds.render += stopwatch.secs();
         self.seconds.cpu += stopwatch.cpu_secs();
+    }
+}
+
+/// The whole scene, packed as the options ask.
+pub(super) fn packed(
+    scene: &Scene,
+    anchor: DVec3,
+    options: &RendererOptions,
+    watcher: &Watcher<'_>,
+) -> Result<PackedScene, PackError> {
+    match options.draft {
+        true => PackedScene::build_draft(scene, anchor, watcher),
+        false => PackedScene::build_at(scene, anchor, watcher),
     }
 }
 

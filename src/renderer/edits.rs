@@ -80,10 +80,11 @@ impl Renderer {
         }
         match entry.side {
             Side::Virtual => {
-                self.core.pack_virtual(watcher)?;
+                self.core.pack_moved(watcher)?;
                 self.restart(false, Changed::Virtual, watcher)
             }
             Side::Real => {
+                self.core.photo_light = None;
                 self.core.pack(watcher)?;
                 self.restart(true, Changed::All, watcher)
             }
@@ -145,6 +146,7 @@ impl Renderer {
         };
         let real_world_changes = real_quads(&self.core.scene.lights) != real_quads(&lights);
         self.core.scene.lights = lights;
+        self.core.photo_light = None;
         if real_world_changes {
             self.core.pack(watcher)?;
         } else {

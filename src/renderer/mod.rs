@@ -79,8 +79,8 @@ pub struct RendererOptions {
     pub without: Without,
     /// Pictures show the difference filtered; the film is not touched.
     pub filter: Option<Filter>,
-    /// For a first look: [`Renderer::backdrop_share`], which only tells, is not estimated; albedo from the photograph stays that of the first
-    /// environment.
+    /// For a first look: [`Renderer::backdrop_share`], which only tells, is not estimated; albedo from the photograph follows from
+    /// the light that was found first, and bounds are looser.
     pub draft: bool,
 }
 
@@ -158,7 +158,7 @@ pub struct Renderer {
     end_sample: u32,
     /// The error of a film that [`Renderer::render_to_error`] made.
     stated: Option<Stated>,
-    /// What the preview filter is guided by; empty where it is off.
+    /// What the filter is guided by; empty where it is off. A draft's outlast all but another camera and another real world.
     surfaces: Vec<Option<RealSurface>>,
 }
 
@@ -209,7 +209,8 @@ impl Renderer {
         }
         let grouped = options.keeps_groups(scene.settings.combine);
         needs::ensure_scene(&scene, options.guides, grouped)?;
-        let packed = PackedScene::build(&scene, watcher)?;
+        let anchor = scene.camera.world_from_camera.w_axis.truncate();
+        let packed = core::packed(&scene, anchor, &options, watcher)?;
         needs::ensure_film(&packed, options.guides, grouped)?;
         let film = Film::new(
             packed.frame.width,
@@ -222,12 +223,14 @@ impl Renderer {
                 time_secs: scene.shutter.map_or(0.0, |shutter| shutter.time_secs),
                 scene,
                 packed,
+                lens_grid: None,
                 film,
                 backend: Backend::Undecided,
                 options,
                 rays: RayCounts::default(),
                 seconds: Seconds::default(),
                 notes: Vec::new(),
+                photo_light: None,
                 backdrop_share: None,
             },
             driver: Driver::Still,

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::accel::{Hit, Ray};
-use crate::camera::lens::camera_ray;
+use crate::camera::lens::{camera_project, camera_ray};
 use crate::cpu::render::render_first_hit;
 use crate::packed::{
     ESTIMATOR_DIRECT, FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_CONES, FRAME_NO_LAST_VERTEX, Frame,
@@ -52,25 +52,89 @@ impl Seen {
     };
 }
 
-/// Fills `scene.photo_albedo` so that the converged Ir reproduces the photograph; the share of its pixels whose albedo had to be limited, because the
-/// proxy's light and the photograph differ by more than any surface does.
-pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo, watcher: &Watcher<'_>) -> f64 {
+/// What the photograph shows of the proxy, and the light on it: what a photograph's albedo follows from.
+pub struct PhotoLight {
+    /// The camera that sees it, relative to the anchor.
+    frame: Frame,
+    anchor_m: [f64; 3],
+    /// By pixel.
+    seen: Vec<Seen>,
+    /// Radiance per unit of albedo, by pixel.
+    light: Vec<Vec3>,
+}
+
+/// Fills `scene.photo_albedo` so that the converged Ir reproduces the photograph; the light that was found, and the share of its pixels whose albedo
+/// had to be limited, because the proxy's light and the photograph differ by more than any surface does.
+pub fn estimate_photo_albedo(
+    scene: &mut PackedScene,
+    photo: &Photo,
+    watcher: &Watcher<'_>,
+) -> (PhotoLight, f64) {
     let seen = first_surfaces(scene, 1, |flags| flags & MATERIAL_PHOTO_ALBEDO != 0);
     scene.photo_albedo = unknown_albedo(scene, &seen);
-    let pixels = seen.len();
-    let scale = scene.frame.exposure_scale;
+    let mut estimate = PhotoLight {
+        frame: scene.frame,
+        anchor_m: scene.anchor_m,
+        seen,
+        light: Vec::new(),
+    };
     let points = grid_points(scene, GRID_PITCH_PX);
     let meter = Meter::begin(watcher, Phase::Albedo, ROUNDS as u64 * points);
     let mut limited = 0;
     for _ in 0..ROUNDS {
-        limited = 0;
-        let light = light_on_surfaces(scene, &seen, &meter);
-        for ((entry, s), (light, ic)) in scene
-            .photo_albedo
-            .iter_mut()
-            .zip(&seen)
-            .zip(light.iter().zip(&photo.linear))
-        {
+        estimate.light = light_on_surfaces(scene, &estimate.seen, &meter);
+        limited = estimate.set_albedo(scene, photo);
+    }
+    meter.end();
+    let known = estimate.seen.iter().filter(|s| s.depth_m > 0.0).count();
+    (estimate, limited as f64 / known.max(1) as f64)
+}
+
+impl PhotoLight {
+    /// The albedo of another exposure or camera, without a ray of light: for a draft. Light that comes from one part of the proxy to another stays
+    /// what it was, and what the first camera did not see lies in the mean light. False if the anchor is another.
+    pub fn take_up(&self, scene: &mut PackedScene, photo: &Photo) -> bool {
+        if self.anchor_m != scene.anchor_m {
+            return false;
+        }
+        let seen = first_surfaces(scene, 1, |flags| flags & MATERIAL_PHOTO_ALBEDO != 0);
+        scene.photo_albedo = unknown_albedo(scene, &seen);
+        let known = self.seen.iter().zip(&self.light);
+        let (sum, count) = known
+            .filter(|(s, _)| s.depth_m > 0.0)
+            .fold((Vec3::ZERO, 0.0), |(sum, count), (_, light)| {
+                (sum + *light, count + 1.0)
+            });
+        let mean = sum / f32::max(count, 1.0);
+        let light = seen.par_iter().map(|s| self.light_at(s).unwrap_or(mean));
+        let light = light.collect();
+        let moved = Self {
+            frame: scene.frame,
+            anchor_m: scene.anchor_m,
+            seen,
+            light,
+        };
+        moved.set_albedo(scene, photo);
+        true
+    }
+
+    /// `None` where the camera did not see the point.
+    fn light_at(&self, point: &Seen) -> Option<Vec3> {
+        if point.depth_m <= 0.0 {
+            return None;
+        }
+        let at = camera_project(&self.frame, point.position);
+        let pixel = at.py as usize * self.frame.width as usize + at.px as usize;
+        let there = at.valid.then(|| self.seen[pixel].depth_m)?;
+        ((there - at.depth).abs() < DEPTH_TOLERANCE * at.depth).then(|| self.light[pixel])
+    }
+
+    /// How many pixels' albedo had to be limited.
+    fn set_albedo(&self, scene: &mut PackedScene, photo: &Photo) -> usize {
+        let mut limited = 0;
+        let scale = scene.frame.exposure_scale;
+        let records = scene.photo_albedo.iter_mut().zip(&self.seen);
+        for ((entry, s), (light, ic)) in records.zip(self.light.iter().zip(&photo.linear)) {
             if s.depth_m > 0.0 {
                 let wanted = Vec3::from(*ic) / (*light * scale).max(Vec3::splat(1e-12));
                 limited += usize::from(wanted.max_element() > MAX_ALBEDO || wanted == Vec3::ZERO);
@@ -78,12 +142,10 @@ pub fn estimate_photo_albedo(scene: &mut PackedScene, photo: &Photo, watcher: &W
                 entry[..3].copy_from_slice(&albedo.to_array());
             }
         }
-        let (of_pixels, of_objects) = scene.photo_albedo.split_at_mut(pixels);
-        set_patches(scene.frame.width, of_pixels, &seen, of_objects);
+        let (of_pixels, of_objects) = scene.photo_albedo.split_at_mut(self.seen.len());
+        set_patches(scene.frame.width, of_pixels, &self.seen, of_objects);
+        limited
     }
-    meter.end();
-    let known = seen.iter().filter(|s| s.depth_m > 0.0).count();
-    limited as f64 / known.max(1) as f64
 }
 
 /// log2 of the factor that fits the real radiance to the photograph over the proxy: the median of Ic / Ir in luminance.

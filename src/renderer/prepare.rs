@@ -1,9 +1,10 @@
 //! What precedes the first sample: after the scene is packed, or after an edit.
 
 use super::backend::Backend;
+use super::core::Core;
 use super::stopwatch::Stopwatch;
 use super::{RenderError, Renderer, photo_albedo};
-use crate::cpu;
+use crate::cpu::{self, LensGrid};
 use crate::film::Film;
 use crate::gpu::Changed;
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PackedScene};
@@ -37,9 +38,11 @@ impl Renderer {
         let stopwatch = Stopwatch::start();
         let look_ahead = self.core.seconds.look_ahead;
         if real_light_changed {
+            self.surfaces.clear();
             self.prepare_photo(watcher);
         }
         let swept = self.prepare_shutter(watcher)?;
+        self.keep_lens_grid();
         self.look_ahead(watcher);
         let core = &mut self.core;
         let changed = match changed {
@@ -98,7 +101,13 @@ impl Renderer {
             }
         }
         if from_photo {
-            let limited = photo_albedo::estimate_photo_albedo(&mut core.packed, photo, watcher);
+            let kept = (core.photo_light.as_ref()).filter(|_| core.options.draft);
+            if kept.is_some_and(|light| light.take_up(&mut core.packed, photo)) {
+                return;
+            }
+            let (light, limited) =
+                photo_albedo::estimate_photo_albedo(&mut core.packed, photo, watcher);
+            core.photo_light = core.options.draft.then_some(light);
             let is_additive = core.scene.settings.composite == Composite::Additive;
             if limited > MOSTLY && is_additive {
                 let albedo = std::mem::take(&mut core.packed.photo_albedo);
@@ -127,6 +136,19 @@ impl Renderer {
         ev
     }
 
+    /// One picture does without; where there is another, more will come.
+    fn keep_lens_grid(&mut self) {
+        let Core {
+            lens_grid, packed, ..
+        } = &mut self.core;
+        if !lens_grid
+            .as_ref()
+            .is_some_and(|grid| grid.fits(&packed.frame))
+        {
+            *lens_grid = Some(LensGrid::of(&packed.frame));
+        }
+    }
+
     /// Runs the pilot and begins the film that follows its plan.
     pub(super) fn look_ahead(&mut self, watcher: &Watcher<'_>) {
         let stopwatch = Stopwatch::start();
@@ -140,7 +162,7 @@ impl Renderer {
         let without = core.options.without;
         without.apply_to_frame(&mut core.packed.frame);
         core.packed.set_backdrop(&core.scene);
-        cpu::pilot(&mut core.packed, &meter);
+        cpu::pilot(&mut core.packed, core.lens_grid.as_ref(), &meter);
         without.apply_to_pixels(&mut core.packed.pixels);
         let photons = core.packed.photons_per_ray > 0;
         let note = core.packed.black_shadows(photons);
@@ -161,8 +183,14 @@ impl Renderer {
         let grouped = core.options.keeps_groups(core.scene.settings.combine);
         core.film.set_groups(grouped);
         core.film.set_photons(core.packed.photons_per_ray > 0);
-        if core.options.filter.is_some() {
-            self.surfaces = cpu::diffuse_surfaces(&core.packed);
+        match (core.options.filter, core.options.draft) {
+            (None, _) => {}
+            (Some(_), false) => self.surfaces = cpu::diffuse_surfaces(&core.packed),
+            (Some(_), true) if self.surfaces.is_empty() => {
+                self.surfaces =
+                    cpu::diffuse_surfaces_of_pinhole(&core.packed, core.lens_grid.as_ref());
+            }
+            (Some(_), true) => {}
         }
         core.seconds.look_ahead += stopwatch.secs();
         core.seconds.cpu += stopwatch.cpu_secs();

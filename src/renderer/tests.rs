@@ -109,3 +109,37 @@ fn a_watcher_hears_every_phase_from_its_beginning_to_its_end() {
         "control: no albedo is estimated"
     );
 }
+
+/// A draft that was edited renders what a draft of the edited scene renders, bit for bit. Control: the scene before.
+#[test]
+fn an_edited_draft_is_a_draft_of_the_edited_scene() {
+    let draft = RendererOptions {
+        filter: Some(Filter::Preview),
+        draft: true,
+        ..RendererOptions::default()
+    };
+    let nobody = Watcher::none();
+    let mut scene = scene_with_a_photo(false);
+    let shown = |renderer: &mut Renderer| {
+        (renderer.advance(Budget::Rays(12), &nobody)).expect("renders");
+        renderer.picture()
+    };
+    let mut edited = Renderer::new(scene.clone(), draft, &nobody).expect("fits");
+    let before = shown(&mut edited);
+    let to = glam::DMat4::from_translation(glam::DVec3::new(0.1, -0.05, 0.2));
+    let lens = crate::scene::Lens {
+        aperture_radius_m: 0.05,
+        ..scene.lens
+    };
+    (edited.set_object_transform(1, to, &nobody)).expect("fits");
+    edited.set_lens(lens, &nobody).expect("fits");
+    (edited.set_environment(30.0, 0.8, &nobody)).expect("fits");
+    scene.objects[1].world_from_object = to;
+    scene.lens = lens;
+    let environment = scene.environment.as_mut().expect("has one");
+    (environment.rotation_deg, environment.scale) = (30.0, 0.8);
+    let mut new = Renderer::new(scene, draft, &nobody).expect("fits");
+    let after = shown(&mut edited);
+    assert_eq!(after, shown(&mut new));
+    assert_ne!(after, before, "control");
+}

@@ -48,7 +48,63 @@ pub fn decode16(code: u16) -> f32 {
 
 /// Nearest 8-bit code, half rounded up, clamped. NaN becomes 0.
 pub fn encode8(linear: f32) -> u8 {
-    quantise(linear, 255.0) as u8
+    static CODES: LazyLock<Codes8> = LazyLock::new(Codes8::new);
+    CODES.of(linear)
+}
+
+/// The 8-bit codes by a look at a few of them, where a power takes ten times as long.
+struct Codes8 {
+    /// By the upper bits of a value from 2^-13 to 1: the code of the least such value.
+    least: Vec<u8>,
+    /// By code, the least value that has a larger one.
+    end: [f32; 256],
+}
+
+impl Codes8 {
+    /// What is below 2^-13 has code 0.
+    const FIRST_BITS: u32 = (127 - 13) << 23;
+    const ONE_BITS: u32 = 127 << 23;
+    /// 128 steps to each doubling: at most two codes lie in one.
+    const SHIFT: u32 = 16;
+
+    fn new() -> Self {
+        let count = ((Self::ONE_BITS - Self::FIRST_BITS) >> Self::SHIFT) + 1;
+        let value = |i: u32| f32::from_bits(Self::FIRST_BITS + (i << Self::SHIFT));
+        let mut end = [f32::INFINITY; 256];
+        for (code, end) in end.iter_mut().enumerate().take(255) {
+            // The bits of positive numbers are in their order.
+            let (mut low, mut high) = (0, Self::ONE_BITS);
+            while high - low > 1 {
+                let middle = low + (high - low) / 2;
+                match quantise(f32::from_bits(middle), 255.0) as usize > code {
+                    true => high = middle,
+                    false => low = middle,
+                }
+            }
+            *end = f32::from_bits(high);
+        }
+        Self {
+            least: (0..count)
+                .map(|i| quantise(value(i), 255.0) as u8)
+                .collect(),
+            end,
+        }
+    }
+
+    fn of(&self, linear: f32) -> u8 {
+        if linear >= 1.0 {
+            return 255;
+        }
+        let bits = linear.to_bits();
+        if linear.is_nan() || linear <= 0.0 || bits < Self::FIRST_BITS {
+            return 0;
+        }
+        let mut code = self.least[((bits - Self::FIRST_BITS) >> Self::SHIFT) as usize];
+        while linear >= self.end[code as usize] {
+            code += 1;
+        }
+        code
+    }
 }
 
 /// Nearest 16-bit code, half rounded up, clamped. NaN becomes 0.
@@ -76,6 +132,24 @@ mod tests {
         for code in 0..=u16::MAX {
             assert_eq!(encode16(decode16(code)), code);
         }
+    }
+
+    /// Those of the formula: beside every border, and at a million values.
+    #[test]
+    fn codes_by_table_are_those_of_the_formula() {
+        let formula = |linear: f32| quantise(linear, 255.0) as u8;
+        for code in 0..255_u8 {
+            let border = decode((f64::from(code) + 0.5) / 255.0) as f32;
+            for bits in border.to_bits() - 300..border.to_bits() + 300 {
+                let linear = f32::from_bits(bits);
+                assert_eq!(encode8(linear), formula(linear), "{linear}");
+            }
+        }
+        for bits in (0..=u32::MAX).step_by(4099) {
+            let linear = f32::from_bits(bits);
+            assert_eq!(encode8(linear), formula(linear), "{linear}");
+        }
+        assert_ne!(encode8(0.5), formula(0.49), "control");
     }
 
     /// Negative control: a pure power of 2.2, the usual shortcut, does not survive.

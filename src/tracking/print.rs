@@ -1,4 +1,4 @@
-//! Boards to print, as SVG in millimetres, with a ruler that shows whether the printer kept the scale.
+//! Boards to print, as SVG or PDF, with a ruler that shows whether the printer kept the scale.
 
 use std::fmt::Write;
 
@@ -7,16 +7,33 @@ use glam::DVec2;
 use super::TrackError;
 use super::board::{Board, BoardKind, is_dark};
 
+mod pdf;
+
 /// White around the outermost markers, metres.
 const MARGIN_M: f64 = 0.015;
 /// Of the ruler, millimetres.
 const RULER_MM: f64 = 100.0;
 const RULER_SPACE_MM: f64 = 12.0;
+const LINE_MM: f64 = 0.1;
+const LETTERS_MM: f64 = 3.5;
+const ADVICE: &str = "100 mm: measure, and print at 100% if it is not";
+
+/// What is printed, in millimetres from the upper left corner of the paper, y down.
+#[derive(Clone, Debug)]
+pub struct Sheet {
+    size: DVec2,
+    /// Black quads, their corners in order.
+    squares: Vec<[DVec2; 4]>,
+    /// Below them: upper left corner of each line, and how long it is downwards.
+    ruler: Vec<(DVec2, f64)>,
+    /// Where the ruler's advice begins.
+    advice: DVec2,
+}
 
 impl Board {
     /// # Errors
     /// Markers of no family, or that do not lie in one plane.
-    pub fn svg(&self) -> Result<String, TrackError> {
+    pub fn sheet(&self) -> Result<Sheet, TrackError> {
         let (squares, size) = match self.kind {
             BoardKind::Chessboard {
                 columns,
@@ -42,35 +59,22 @@ impl Board {
                 self.markers(least - MARGIN_M)?
             }
         };
-        let (width, height) = (size.x.max(RULER_MM + 20.0), size.y + RULER_SPACE_MM + 8.0);
-        let mut text = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.3}mm\" height=\"{height:.3}mm\" viewBox=\"0 0 {width:.3} {height:.3}\">\n<rect width=\"{width:.3}\" height=\"{height:.3}\" fill=\"white\"/>\n"
-        );
-        for [a, b, c, d] in squares {
-            let points = [a, b, c, d]
-                .map(|p| format!("{:.4},{:.4}", p.x, p.y))
-                .join(" ");
-            let _ = writeln!(text, "<polygon points=\"{points}\"/>");
-        }
-        let (left, top) = (10.0, size.y + 4.0);
-        for mm in 0..=RULER_MM as u32 {
+        let ruler = DVec2::new(10.0, size.y + 4.0);
+        let line = |mm: u32| {
             let length = match mm {
-                mm if mm % 10 == 0 => 4.0,
-                mm if mm % 5 == 0 => 2.5,
+                mm if mm.is_multiple_of(10) => 4.0,
+                mm if mm.is_multiple_of(5) => 2.5,
                 _ => 1.5,
             };
-            let _ = writeln!(
-                text,
-                "<rect x=\"{:.3}\" y=\"{top:.3}\" width=\"0.1\" height=\"{length}\"/>",
-                left + f64::from(mm) - 0.05
-            );
-        }
-        let _ = writeln!(
-            text,
-            "<text x=\"{left}\" y=\"{:.3}\" font-size=\"3.5\" font-family=\"sans-serif\">100 mm: measure, and print at 100% if it is not</text>\n</svg>",
-            top + 9.0
-        );
-        Ok(text)
+            let left = f64::from(mm) - 0.5 * LINE_MM;
+            (ruler + DVec2::new(left, 0.0), length)
+        };
+        Ok(Sheet {
+            size: DVec2::new(size.x.max(RULER_MM + 20.0), size.y + RULER_SPACE_MM + 8.0),
+            squares,
+            ruler: (0..=RULER_MM as u32).map(line).collect(),
+            advice: ruler + DVec2::new(0.0, 9.0),
+        })
     }
 
     /// Black cells, `origin` being the sheet's upper left corner, metres; and where the last of them ends.
@@ -121,6 +125,35 @@ impl Board {
     }
 }
 
+impl Sheet {
+    pub fn svg(&self) -> String {
+        let DVec2 {
+            x: width,
+            y: height,
+        } = self.size;
+        let mut text = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.3}mm\" height=\"{height:.3}mm\" viewBox=\"0 0 {width:.3} {height:.3}\">\n<rect width=\"{width:.3}\" height=\"{height:.3}\" fill=\"white\"/>\n"
+        );
+        for square in &self.squares {
+            let points = square.map(|p| format!("{:.4},{:.4}", p.x, p.y)).join(" ");
+            let _ = writeln!(text, "<polygon points=\"{points}\"/>");
+        }
+        for (corner, length) in &self.ruler {
+            let _ = writeln!(
+                text,
+                "<rect x=\"{:.3}\" y=\"{:.3}\" width=\"{LINE_MM}\" height=\"{length}\"/>",
+                corner.x, corner.y
+            );
+        }
+        let _ = writeln!(
+            text,
+            "<text x=\"{}\" y=\"{:.3}\" font-size=\"{LETTERS_MM}\" font-family=\"sans-serif\">{ADVICE}</text>\n</svg>",
+            self.advice.x, self.advice.y
+        );
+        text
+    }
+}
+
 fn chessboard(
     columns: usize,
     rows: usize,
@@ -146,14 +179,26 @@ mod tests {
     #[test]
     fn a_marker_is_its_black_cells_and_the_ruler_has_its_length() {
         let mut board = Board::grid((1, 1), &[5], (0.04, 0.01), 0);
-        assert!(board.svg().unwrap_err().to_string().contains("family"));
+        assert!(board.sheet().unwrap_err().to_string().contains("family"));
         let family = Family::named("aruco-4x4").unwrap();
         board.family = Some(family);
-        let svg = board.svg().unwrap();
+        let sheet = board.sheet().unwrap();
+        let svg = sheet.svg();
         let white = family.codes[5].count_ones() as usize;
         assert_eq!(svg.matches("<polygon").count(), 36 - white);
         assert_eq!(svg.matches("width=\"0.1\"").count(), 101);
-        let chess = Board::chessboard(6, 4, 0.03).svg().unwrap();
+        let pdf = String::from_utf8_lossy(&sheet.pdf()).into_owned();
+        let lines = |end: &str| pdf.lines().filter(|line| line.ends_with(end)).count();
+        assert_eq!((lines(" m"), lines(" re")), (36 - white, 101));
+        // Points, of which 72 are an inch: the sheet of 70 mm and a ruler's space, and its ruler's 20 mm beside.
+        let size = [120.0, 90.0].map(|mm| mm / 25.4 * 72.0);
+        let numbers = pdf.split("/MediaBox [0 0 ").nth(1).unwrap();
+        let numbers = numbers.split(']').next().unwrap().split(' ');
+        for (found, expected) in numbers.zip(size) {
+            let found: f64 = found.parse().unwrap();
+            assert!((found - expected).abs() < 1e-3, "{found} {expected}");
+        }
+        let chess = Board::chessboard(6, 4, 0.03).sheet().unwrap().svg();
         let charuco = Board {
             family: Some(family),
             ..Board::charuco((5, 4), (0.04, 0.03), true)
@@ -162,7 +207,7 @@ mod tests {
             .map(|id| 36 - family.codes[id].count_ones() as usize)
             .sum();
         assert_eq!(
-            charuco.svg().unwrap().matches("<polygon").count(),
+            charuco.sheet().unwrap().svg().matches("<polygon").count(),
             10 + black
         );
         assert_eq!(chess.matches("<polygon").count(), 18);

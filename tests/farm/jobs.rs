@@ -219,10 +219,12 @@ fn what_makes_no_job_is_refused() {
         |engine: &str, more: &str| format!("submit scene.toml --engine {engine} -o job {more}");
     let video = "--frames in --trajectory poses.json";
     for (line, part) in [
-        (job("make", ""), "--ranges"),
+        (job("make", "--target-error 0.01"), "all rays of a picture"),
+        (job("make", "--ranges 2 --filter"), "all rays of a picture"),
+        (job("make", &format!("{video} --ranges 2")), "--ranges"),
         (
-            job("make", "--ranges 2 --target-error 0.01"),
-            "cannot be used with",
+            job("make", "").replace("scene.toml", "none.toml"),
+            "none.toml: cannot be read",
         ),
         (job("make", "--ranges 2 --stats a.json"), "--stats"),
         (

@@ -7,7 +7,7 @@ use glam::DVec3;
 use mixray::tracking::Family;
 
 use crate::support::{Folder, Random, stderr};
-use crate::tracking::film::{Film, View, markers};
+use crate::tracking::film::{Film, View, looking, markers};
 
 const BOARD: &str =
     "family = \"apriltag-36h11\"\n[grid]\ncolumns = 4\nrows = 3\nside_m = 0.04\ngap_m = 0.02\n";
@@ -211,5 +211,71 @@ fn a_board_is_taken_over_as_it_was_learnt() {
     folder.refuse(
         "live scene.toml --board wrong.json --input film.y4m",
         "--report",
+    );
+}
+
+const ONE_MARKER: &str =
+    "family = \"apriltag-36h11\"\n[grid]\ncolumns = 1\nrows = 1\nside_m = 0.09\ngap_m = 0.02\n";
+
+/// A marker that moves by 30 pixels, is covered by a hand, is found again 100 pixels further, and then hardly moves.
+fn covered() -> (Folder, Vec<u8>) {
+    let folder = Folder::new();
+    folder.write("board.toml", ONE_MARKER);
+    let tags = Family::named("apriltag-36h11").unwrap();
+    let begin = looking(0.6, 0.5, 0.45, 0.1);
+    let aside = |x_m: f64| View {
+        translation: begin.translation + DVec3::new(x_m, 0.0, 0.0),
+        ..begin
+    };
+    let film = Film {
+        views: [0.04, 0.014, 0.014, -0.075, -0.076].map(aside).to_vec(),
+        ..Film::around()
+    };
+    film.save(&folder, "film.y4m", &markers(tags, 1, 1, 0.09, 0.02));
+    let mut stream = folder.bytes("film.y4m");
+    let header = parts(&stream).0.len();
+    let frame = b"FRAME\n".len() + 480 * 360 * 3 / 2;
+    let luma = header + 2 * frame + b"FRAME\n".len();
+    for row in 0..180 {
+        // Over half of the marker.
+        stream[luma + 480 * row..][..480].fill(90);
+    }
+    (folder, stream)
+}
+
+/// The paper's blur: along the way from one pose to the next, if it is neither too short nor too long. What the tracking of one marker throws out,
+/// which is the way to where it is found again after it was covered, is no blur. Control: without the two thresholds it is.
+#[test]
+fn blur_is_of_ways_between_both_thresholds_and_not_of_a_covered_marker() {
+    let (folder, stream) = covered();
+    let run = |thresholds: Option<[f32; 2]>| {
+        let blur = thresholds.map_or(String::new(), |[min, max]| {
+            format!(
+                "[motion_blur]\nmethod = \"copies\"\nmin_length_px = {min}\nmax_length_px = {max}\n"
+            )
+        });
+        folder.write("scene.toml", format!("{SCENE}{blur}"));
+        let line = "live scene.toml --board board.toml --gamma 2.2 --backend cpu --rpp 1 --hold 100 --stats stats.json";
+        in_step(&folder, line, &stream)
+    };
+    let sharp = run(None);
+    let counts = folder.json("stats.json")["total"]["frames"].clone();
+    assert_eq!(
+        (&counts["rendered"], &counts["held"]),
+        (&4.into(), &1.into())
+    );
+    let blurred = |frames: Vec<Vec<u8>>| -> Vec<bool> {
+        let pairs = frames.iter().zip(&sharp);
+        pairs
+            .map(|(frame, sharp)| changed(frame, sharp) > 200)
+            .collect()
+    };
+    assert_eq!(
+        blurred(run(Some([5.0, 60.0]))),
+        [false, true, false, false, false]
+    );
+    assert_eq!(
+        blurred(run(Some([0.2, 1000.0]))),
+        [false, true, false, true, true]
     );
 }

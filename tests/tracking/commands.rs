@@ -258,6 +258,9 @@ fn boards_to_print() {
     folder.succeed("track --print-board board.toml -o board.svg");
     let svg = folder.read("board.svg");
     assert!(svg.starts_with("<svg") && svg.contains("100 mm"));
+    folder.succeed("track --print-board board.toml -o board.pdf");
+    assert!(folder.bytes("board.pdf").starts_with(b"%PDF-"));
+    folder.refuse("track --print-board board.toml -o board.png", "svg");
     folder.write(
         "nameless.toml",
         BOARD.replace("family = \"apriltag-36h11\"\n", ""),

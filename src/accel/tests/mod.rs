@@ -458,3 +458,43 @@ fn what_rests_is_not_built_again() {
     assert_ne!(moving(&parts), before.1, "control");
     drop(kept);
 }
+
+/// Against a tree built anew, bit for bit, with half of the triangles moved far off. Control: the tree before.
+#[test]
+fn a_refitted_tree_meets_what_a_new_one_meets() {
+    let before = soup(2000, 0.2, 5);
+    let mut after = before.clone();
+    for triangle in &mut after[..1000] {
+        *triangle = triangle.map(|v| Vec3::new(v.y, 0.5 * v.x, v.z + 0.7));
+    }
+    let new = WorldBvh::build(&after, 7).expect("builds");
+    let old = WorldBvh::build(&before, 7).expect("builds");
+    let mut refitted = WorldBvh::build(&before, 7).expect("builds");
+    assert!(refitted.refit(&after).expect("finite"));
+    let mut random = Random(3);
+    let mut others = 0;
+    for _ in 0..2000 {
+        let ray = random_ray(&mut random, Vec3::ZERO, 1.0);
+        let hit = new.closest(&ray);
+        for kernel in kernels() {
+            assert_eq!(refitted.closest_by(kernel, &ray), hit, "{kernel:?} {ray:?}");
+            assert_eq!(
+                refitted.any_by(kernel, &ray),
+                hit.is_hit(),
+                "{kernel:?} {ray:?}"
+            );
+        }
+        others += usize::from(old.closest(&ray) != hit);
+    }
+    assert!(others > 100, "control: {others}");
+    assert_eq!(refitted.bounds(), new.bounds());
+    assert_eq!(
+        refitted.gpu_leaves(),
+        new.gpu_leaves(),
+        "built anew for a device"
+    );
+    assert!(
+        !refitted.refit(&after[1..]).expect("finite"),
+        "another number"
+    );
+}

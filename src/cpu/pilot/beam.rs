@@ -2,29 +2,62 @@
 
 use glam::Vec3;
 
-use crate::camera::lens::{camera_ray_from, is_wide, lens_undistort};
+use super::patch::{Patch, in_world};
+use crate::camera::lens::is_wide;
 use crate::camera::shutter::{CameraPose, camera_pose, camera_pose_at};
-use crate::packed::{FRAME_SHUTTER, Frame, PackedScene, SHUTTER_POSES};
+use crate::math::normalize3;
+use crate::packed::{FRAME_SHUTTER, Frame, SHUTTER_POSES};
 
-/// All rays of one pixel: at axis depth z they lie within `radius(z)` of the pinhole ray through the pixel's centre.
-pub struct Beam {
-    pub origin: Vec3,
-    /// Unit.
-    pub direction: Vec3,
-    /// View axis, unit.
-    axis: Vec3,
+/// A centre, and a radius in metres.
+pub type Sphere = (Vec3, f32);
+
+/// How far the rays of a pixel lie from the pinhole ray through its centre.
+#[derive(Clone, Copy, Debug)]
+pub struct Blur {
     /// Pixel footprint at axis depth 1, metres.
     footprint: f32,
     aperture_radius: f32,
     inv_focus_distance: f32,
     /// How far the camera moves from where it is in the middle of the row's exposure, metres.
     shake: f32,
+}
+
+impl Blur {
+    /// Of a camera that rests; `footprint`: at axis depth 1, metres.
+    pub fn of(frame: &Frame, footprint: f32) -> Self {
+        Self {
+            footprint,
+            aperture_radius: frame.aperture_radius * SQUARE_REACH,
+            inv_focus_distance: frame.inv_focus_distance,
+            shake: 0.0,
+        }
+    }
+
+    /// Largest distance from the centre ray over the axis depths z0..z1; convex in z, so the ends decide.
+    pub fn radius(&self, z0: f32, z1: f32) -> f32 {
+        let blur = |z: f32| {
+            self.aperture_radius * (1.0 - z * self.inv_focus_distance).abs()
+                + self.footprint * z.max(0.0)
+                + self.shake
+        };
+        blur(z0.max(0.0)).max(blur(z1.max(0.0)))
+    }
+}
+
+/// All rays of one pixel: at axis depth z they lie within `blur.radius(z)` of the pinhole ray through the pixel's centre.
+pub struct Beam {
+    pub origin: Vec3,
+    /// Unit.
+    pub direction: Vec3,
+    /// View axis, unit.
+    axis: Vec3,
+    blur: Blur,
     /// Of a fisheye without an aperture, whose rays may look back: the half-angle of the cone that holds them, radians.
     cone: Option<f32>,
 }
 
 /// Rounding and the curvature of the distortion inside one pixel.
-const FOOTPRINT_MARGIN: f32 = 1.1;
+pub const FOOTPRINT_MARGIN: f32 = 1.1;
 /// A square of half-width 1 reaches this far.
 const SQUARE_REACH: f32 = std::f32::consts::SQRT_2;
 
@@ -62,27 +95,22 @@ impl RowPoses {
 }
 
 impl Beam {
-    pub fn of_pixel(frame: &Frame, pinhole: &Frame, pixel: u32) -> Self {
-        let (row, column) = (pixel / frame.width, pixel % frame.width);
-        let (x, y) = (column as f32, row as f32);
-        let poses = RowPoses::of(frame, row);
+    /// `at`: the pixel's place in the patch.
+    pub fn of_pixel(frame: &Frame, patch: &Patch, at: usize) -> Self {
+        let poses = RowPoses::of(frame, patch.row_px(at));
         let middle = poses.all[0];
         let axis = -middle.back;
-        let centre = camera_ray_from(pinhole, &middle, x + 0.5, y + 0.5, 0.5, 0.5);
+        let (look, corners) = patch.looks(at);
+        let direction = normalize3(in_world(&middle, look));
         let at_depth_1 = |d: Vec3| d / d.dot(axis).max(1e-6);
-        let ahead = at_depth_1(centre.direction);
-        let [fx, fy, cx, cy] = frame.intrinsics;
-        // The distortion is the same wherever the camera is.
-        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
-            .map(|(dx, dy)| lens_undistort(frame, (x + dx - cx) / fx, (y + dy - cy) / fy));
+        let ahead = at_depth_1(direction);
         let (mut footprint, mut shake) = (0.0f32, 0.0f32);
         for pose in &poses.all[..poses.count] {
             // What a step of the camera does to the ray at a given depth, and what the lens's plane does that turns with it.
             let step = pose.position.distance(middle.position);
             let turn = 2.0 * frame.aperture_radius * pose.back.distance(middle.back);
-            for ideal in corners.iter().filter(|_| !is_wide(frame)) {
-                let direction =
-                    at_depth_1(pose.right * ideal[0] - (pose.up * ideal[1] + pose.back));
+            for corner in corners.iter().filter(|_| !is_wide(frame)) {
+                let direction = at_depth_1(in_world(pose, *corner));
                 footprint = footprint.max(direction.distance(ahead));
                 shake = shake.max((step + turn) * (1.0 + direction.length()));
             }
@@ -91,39 +119,29 @@ impl Beam {
             let mut half_angle = 0.0f32;
             for pose in &poses.all[..poses.count] {
                 shake = shake.max(pose.position.distance(middle.position));
-                for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-                    let ray = camera_ray_from(pinhole, pose, x + dx, y + dy, 0.5, 0.5);
-                    half_angle = half_angle.max(angle_between(ray.direction, centre.direction));
+                for corner in corners {
+                    let corner = normalize3(in_world(pose, corner));
+                    half_angle = half_angle.max(angle_between(corner, direction));
                 }
             }
             half_angle * FOOTPRINT_MARGIN
         });
         Self {
-            origin: centre.origin,
-            direction: centre.direction,
+            origin: middle.position,
+            direction,
             axis,
-            footprint: footprint * FOOTPRINT_MARGIN,
-            aperture_radius: frame.aperture_radius * SQUARE_REACH,
-            inv_focus_distance: frame.inv_focus_distance,
-            shake: shake * FOOTPRINT_MARGIN,
+            blur: Blur {
+                shake: shake * FOOTPRINT_MARGIN,
+                ..Blur::of(frame, footprint * FOOTPRINT_MARGIN)
+            },
             cone,
         }
-    }
-
-    /// Largest distance from the centre ray over the axis depths z0..z1; convex in z, so the ends decide.
-    fn radius(&self, z0: f32, z1: f32) -> f32 {
-        let blur = |z: f32| {
-            self.aperture_radius * (1.0 - z * self.inv_focus_distance).abs()
-                + self.footprint * z.max(0.0)
-                + self.shake
-        };
-        blur(z0.max(0.0)).max(blur(z1.max(0.0)))
     }
 
     fn may_meet_sphere(&self, centre: Vec3, radius: f32) -> bool {
         let to = centre - self.origin;
         if let Some(half_angle) = self.cone {
-            let reach = (radius + self.shake) * 1.001;
+            let reach = (radius + self.blur.shake) * 1.001;
             let distance = to.length();
             return distance <= reach || {
                 let wide = half_angle + (reach / distance).asin();
@@ -135,30 +153,19 @@ impl Beam {
             return false;
         }
         let off_ray = (to - self.direction * to.dot(self.direction)).length();
-        off_ray <= (radius + self.radius(z - radius, z + radius)) * 1.001
+        off_ray <= (radius + self.blur.radius(z - radius, z + radius)) * 1.001
     }
 
-    pub fn may_meet_virtual(&self, scene: &PackedScene) -> bool {
-        let spheres = match scene.swept_spheres.as_slice() {
-            [] => &scene.frame.spheres[..scene.frame.sphere_count as usize],
-            swept => swept,
-        };
-        spheres
-            .iter()
-            .any(|s| self.may_meet_sphere(Vec3::new(s[0], s[1], s[2]), s[3]))
-    }
-
-    pub fn may_meet_real(&self, scene: &PackedScene) -> bool {
-        match scene.real_bvh.bounds() {
-            None => false,
-            Some((lo, hi)) => self.may_meet_sphere((lo + hi) * 0.5, (hi - lo).length() * 0.5),
-        }
+    pub fn may_meet_any(&self, spheres: &[Sphere]) -> bool {
+        (spheres.iter()).any(|&(centre, radius)| self.may_meet_sphere(centre, radius))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::lens::camera_ray_from;
+    use crate::cpu::pilot::patch::LensGrid;
     use crate::distortion::Distortion;
     use crate::math::{hash_u32, uniform_from_bits};
     use crate::pack::camera::frame_camera;
@@ -192,11 +199,13 @@ mod tests {
     fn rays_of_a_fisheyes_pixel_stay_in_its_beam() {
         let random = |i: u32| uniform_from_bits(hash_u32(i));
         for aperture_radius_m in [0.0, 0.02] {
-            let (frame, pinhole) = (frame(aperture_radius_m), frame(0.0));
+            let frame = frame(aperture_radius_m);
+            let grid = LensGrid::of(&frame);
             let (mut worst, mut control) = (0.0f32, 0.0f32);
             for i in 0..20_000 {
                 let pixel = hash_u32(i) % (64 * 48);
-                let beam = Beam::of_pixel(&frame, &pinhole, pixel);
+                let (patch, at) = grid.place(&frame, pixel as usize);
+                let beam = Beam::of_pixel(&frame, patch, at);
                 let (x, y) = ((pixel % 64) as f32, (pixel / 64) as f32);
                 let [dx, dy, u, v] = [1, 2, 3, 4].map(|n| random(4 * i + n));
                 let ray = camera_ray_from(&frame, &camera_pose(&frame), x + dx, y + dy, u, v);
@@ -210,7 +219,7 @@ mod tests {
                     None => {
                         let off = at(ray.origin, ray.direction);
                         let off = off.distance(at(beam.origin, beam.direction));
-                        (off, beam.radius(depth, depth))
+                        (off, beam.blur.radius(depth, depth))
                     }
                 };
                 worst = worst.max(off / bound);

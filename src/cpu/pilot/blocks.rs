@@ -1,7 +1,7 @@
 //! The picture in square blocks of pixels, the pilot's resolution.
 
 /// Pixels along a block's side.
-const SIDE_PX: usize = 4;
+pub const SIDE_PX: usize = 4;
 
 pub struct Blocks {
     width: usize,
@@ -65,12 +65,6 @@ impl Blocks {
             .step_by(side_px)
             .flat_map(|y| (0..width).step_by(side_px).map(move |x| (x, y)));
         corners.map(|(x, y)| square(x, y)).collect()
-    }
-
-    /// The first pixel of a block.
-    pub fn first_pixel(&self, block: usize) -> usize {
-        let (x, y) = self.corner(block);
-        y * self.width + x
     }
 
     fn corner(&self, block: usize) -> (usize, usize) {

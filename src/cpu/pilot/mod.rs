@@ -10,10 +10,10 @@ mod blocks;
 mod highlights;
 mod importance;
 mod measurement;
+mod patch;
+mod reach;
 
 use std::ops::Add;
-
-use rayon::prelude::*;
 
 use super::contribution::photons_traced;
 use super::photons::guide::learn;
@@ -25,6 +25,10 @@ use blocks::Blocks;
 pub(crate) use importance::MAX_LIGHTS_EXAMINED;
 use importance::{PilotLights, importance};
 use measurement::Moments;
+pub use patch::LensGrid;
+pub(super) use patch::{Certainty, each_patch, in_world};
+use reach::WorldSpheres;
+pub(super) use reach::real_sphere;
 
 use crate::cpu::sharing::BLOCK_SIDE;
 use crate::packed::{
@@ -48,8 +52,8 @@ pub fn pilot_steps(frame: &Frame) -> u64 {
     (width * height) as u64 + STEPS_OF_A_BLOCK * Blocks::of(width, height).count() as u64
 }
 
-/// Fills `scene.pixels`. The same for every seed, sample range and backend.
-pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
+/// Fills `scene.pixels`. The same for every seed, sample range and backend. `grid`: the lens's, where there is one, which spares undistorting.
+pub fn pilot(scene: &mut PackedScene, grid: Option<&LensGrid>, meter: &Meter<'_>) {
     let (width, height) = (scene.frame.width as usize, scene.frame.height as usize);
     let nothing_virtual = scene.frame.sphere_count == 0
         && scene.swept_spheres.is_empty()
@@ -61,19 +65,8 @@ pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
         scene.pixels = vec![PixelInfo::uniform(PIXEL_OUT_OF_REACH); width * height];
         return;
     }
-    let pinhole = Frame {
-        aperture_radius: 0.0,
-        ..scene.frame
-    };
-    let flags: Vec<u32> = (0..width * height)
-        .into_par_iter()
-        .map(|i| {
-            if i % width == 0 {
-                meter.add(width as u64);
-            }
-            flags_of(scene, &Beam::of_pixel(&scene.frame, &pinhole, i as u32))
-        })
-        .collect();
+    let blocks = Blocks::of(width, height);
+    let (flags, importances) = look(scene, grid, &blocks, meter);
     if photons_traced(&scene.frame) {
         scene.photons_per_ray = unmeasured(width * height);
     }
@@ -81,19 +74,6 @@ pub fn pilot(scene: &mut PackedScene, meter: &Meter<'_>) {
         scene.pixels = flags.into_iter().map(PixelInfo::uniform).collect();
         return;
     }
-    let blocks = Blocks::of(width, height);
-    let lights = PilotLights::of(scene);
-    let importances: Vec<f32> = (0..blocks.count())
-        .into_par_iter()
-        .map(|block| {
-            let pixel = blocks.first_pixel(block) as u32;
-            importance(
-                scene,
-                &Beam::of_pixel(&scene.frame, &pinhole, pixel),
-                &lights,
-            )
-        })
-        .collect();
     // A lens beam must not jump off the map at an edge.
     let importances: Vec<f32> = (0..blocks.count())
         .map(|block| blocks.gather(&importances, block, 1, 0.0, f32::max))
@@ -143,14 +123,53 @@ fn sharing_allowed(scene: &PackedScene) -> bool {
     scene.frame.flags & (FRAME_ALPHA | FRAME_NO_SHARING) == 0 && scene.swept_spheres.is_empty()
 }
 
-fn flags_of(scene: &PackedScene, beam: &Beam) -> u32 {
-    if beam.may_meet_virtual(scene) {
-        PIXEL_BEAM_MAY_MEET_VIRTUAL
-    } else if beam.may_meet_real(scene) {
-        0
-    } else {
-        PIXEL_OUT_OF_REACH
+/// What a patch's pixels and its blocks are found to be.
+struct PatchFindings {
+    flags: Vec<(usize, u32)>,
+    importances: Vec<(usize, f32)>,
+}
+
+/// Each pixel's flags, and each block's importance.
+fn look(
+    scene: &PackedScene,
+    grid: Option<&LensGrid>,
+    blocks: &Blocks,
+    meter: &Meter<'_>,
+) -> (Vec<u32>, Vec<f32>) {
+    let frame = &scene.frame;
+    let spheres = WorldSpheres::of(scene);
+    let weighs = frame.estimator != ESTIMATOR_PAPER;
+    let lights = weighs.then(|| PilotLights::of(scene));
+    let findings = each_patch(frame, grid, |patch| {
+        let flags = spheres.flags(frame, patch);
+        meter.add(flags.len() as u64);
+        let importances = lights.iter().flat_map(|lights| {
+            let firsts = patch.firsts(frame, blocks::SIDE_PX);
+            firsts.map(|(at, pixel)| {
+                let found = match flags[at].1 {
+                    // Nor does its ray meet anything real.
+                    PIXEL_OUT_OF_REACH => 0.0,
+                    _ => importance(scene, &Beam::of_pixel(frame, patch, at), lights),
+                };
+                (blocks.of_pixel(pixel), found)
+            })
+        });
+        PatchFindings {
+            importances: importances.collect(),
+            flags,
+        }
+    });
+    let mut flags = vec![0; scene.frame.width as usize * scene.frame.height as usize];
+    let mut importances = vec![0.0; blocks.count()];
+    for patch in findings {
+        for (pixel, found) in patch.flags {
+            flags[pixel] = found;
+        }
+        for (block, found) in patch.importances {
+            importances[block] = found;
+        }
     }
+    (flags, importances)
 }
 
 /// What samples scatter and cost, and the squared errors of highlights, by blocks.

@@ -72,3 +72,27 @@ fn facets_of_smooth_meshes_fade_towards_their_horizon() {
         Vec3::splat(flat.ns.dot(wi).max(0.0) * std::f32::consts::FRAC_1_PI)
     );
 }
+
+/// Light from all around in the plane of the tilts, which are those of the facets of a sphere of 160 segments.
+#[test]
+fn fading_keeps_the_light_of_a_fine_mesh() {
+    let half_facet = PI / 160.0;
+    let (mut kept, mut all, mut by_chiang) = (0.0, 0.0, 0.0);
+    for tilt in (-20..=20).map(|i| half_facet * f64::from(i) / 20.0) {
+        let s = tilted(tilt, 0);
+        for elevation in (0..4000).map(|i| PI * (f64::from(i) + 0.5) / 4000.0) {
+            let (found, lambert) = response(&s, elevation);
+            kept += found;
+            all += lambert;
+            let g = (elevation.sin() / (elevation + tilt).sin() / tilt.cos()).min(1.0);
+            by_chiang += lambert * (g + g * g - g * g * g);
+        }
+    }
+    assert!(
+        (kept / all - 1.0).abs() < 1e-4,
+        "lost {:e}",
+        1.0 - kept / all
+    );
+    let lost = 1.0 - by_chiang / all;
+    assert!(lost > 4e-4, "control: {lost:e}");
+}

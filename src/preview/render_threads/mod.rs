@@ -13,6 +13,7 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use super::composition::Composition;
 use super::view::View;
+use crate::clock::thread_time;
 use crate::film::Picture;
 use crate::renderer::{Budget, Progress, RenderError, Watcher};
 use crate::scene::Scene;
@@ -77,6 +78,8 @@ pub struct Latency {
     pub level: Level,
     pub change: &'static str,
     pub time: Duration,
+    /// Of the processors, for the picture.
+    pub processor_time: Duration,
 }
 
 /// What goes on, for the window's status line.
@@ -290,6 +293,7 @@ fn step(
         true => watcher,
         false => watcher.cancelled_by(&cancelled),
     };
+    let spent_before = processor_time();
     let change = take_up(level, wanted, current, &watcher)?;
     let Some(Current { renderer, .. }) = current else {
         return Ok(true);
@@ -323,12 +327,22 @@ fn step(
         Level::Coarse => coarse_picture(renderer, wanted),
         Level::Fine => fine_picture(renderer, wanted),
     };
-    publish(shared, wanted, shown, change);
+    let latency = change.map(|change| Latency {
+        level,
+        change,
+        time: wanted.since.elapsed(),
+        processor_time: processor_time().saturating_sub(spent_before),
+    });
+    publish(shared, wanted, shown, latency);
     Ok(samples >= total)
 }
 
-fn publish(shared: &Shared, wanted: &Wanted, shown: Shown, change: Option<&'static str>) {
-    let level = shown.level;
+/// Of the threads of the current pool.
+fn processor_time() -> Duration {
+    rayon::broadcast(|_| thread_time()).into_iter().sum()
+}
+
+fn publish(shared: &Shared, wanted: &Wanted, shown: Shown, latency: Option<Latency>) {
     let mut state = shared.lock();
     // Where both threads show the same edit, the whole picture is the better.
     let is_older = (state.shown.as_ref()).is_some_and(|other| {
@@ -344,13 +358,7 @@ fn publish(shared: &Shared, wanted: &Wanted, shown: Shown, change: Option<&'stat
     if !is_older {
         state.shown = Some(Arc::new(shown));
     }
-    if let Some(change) = change {
-        state.latencies.push(Latency {
-            level,
-            change,
-            time: wanted.since.elapsed(),
-        });
-    }
+    state.latencies.extend(latency);
     drop(state);
     shared.changed.notify_all();
     (shared.wake)();

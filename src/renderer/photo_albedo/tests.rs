@@ -131,7 +131,7 @@ fn what_is_not_seen_has_the_mean_colour_of_what_is_near() {
         };
     }
     let mut packed = PackedScene::build(&scene, &Watcher::none()).expect("packs");
-    let limited = estimate_photo_albedo(&mut packed, &photo, &Watcher::none());
+    let (_, limited) = estimate_photo_albedo(&mut packed, &photo, &Watcher::none());
     assert_eq!(limited, 0.0);
     let direction = Vec3::new(0.8, 0.0, -1.0).normalize();
     let hit = packed.real_bvh.closest(&Ray {
@@ -156,9 +156,42 @@ fn light_that_does_not_fit_is_counted() {
     let (mut scene, photo) = scene();
     let share = |scene: &Scene| {
         let mut packed = PackedScene::build(scene, &Watcher::none()).expect("packs");
-        estimate_photo_albedo(&mut packed, &photo, &Watcher::none())
+        estimate_photo_albedo(&mut packed, &photo, &Watcher::none()).1
     };
     assert_eq!(share(&scene), 0.0, "control");
     scene.environment.as_mut().expect("has one").map = EnvironmentMap::Constant([0.125; 3]);
     assert!(share(&scene) > 0.9);
+}
+
+/// Of a draft: another exposure and camera take the light that was found, and come to the albedo of an estimate of their own. Control: the albedo of
+/// before.
+#[test]
+fn light_that_was_found_serves_another_exposure_and_camera() {
+    let (mut scene, photo) = scene();
+    let mut packed = PackedScene::build(&scene, &Watcher::none()).expect("packs");
+    let (light, _) = estimate_photo_albedo(&mut packed, &photo, &Watcher::none());
+    let largest_error = |packed: &PackedScene, exact: &PackedScene| {
+        let pixels = |packed: &PackedScene| packed.photo_albedo[..32 * 32].to_vec();
+        let pairs = pixels(packed).into_iter().zip(pixels(exact));
+        pairs.fold(0.0, |worst: f32, (a, b)| {
+            let off = (Vec3::from_slice(&a) - Vec3::from_slice(&b)).abs();
+            worst.max(off.max_element())
+        })
+    };
+    scene.settings.exposure = crate::scene::Exposure::Ev(1.0);
+    scene.camera.world_from_camera =
+        glam::DMat4::from_translation(glam::DVec3::new(0.125, 0.0, 0.0));
+    packed.set_settings(&scene);
+    packed.set_camera(&scene);
+    let build = |anchor| PackedScene::build_at(&scene, anchor, &Watcher::none()).expect("packs");
+    let mut exact = build(glam::DVec3::ZERO);
+    estimate_photo_albedo(&mut exact, &photo, &Watcher::none());
+    assert!(largest_error(&packed, &exact) > 0.1, "control");
+    assert!(light.take_up(&mut packed, &photo));
+    let error = largest_error(&packed, &exact);
+    assert!(error < 0.02, "{error}");
+    assert!(
+        !light.take_up(&mut build(glam::DVec3::X), &photo),
+        "another anchor"
+    );
 }

@@ -1,0 +1,183 @@
+#!/usr/bin/env python3
+"""`mixray live` on the marker video, beside the tables of the papers of 2005 and 2006: a minute at 25 frames a second, and what each stage takes.
+
+    python3 benches/peers/live.py [--mixray target/release/mixray] [--data ../shared/data] [--seconds 60] [--threads 1] [--write docs/live.md]
+
+Wants ffmpeg. A writer hands the frames over at their times; a reader takes what comes out. Then, without a clock, each frame waits for the one
+before. Prints the tables; exits with 1 where a bar is missed.
+"""
+
+import argparse
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+WIDTH, HEIGHT, RATE = 640, 480, 25
+FRAME_BYTES = len(b"FRAME\n") + WIDTH * HEIGHT * 3 // 2
+STEP_FRAMES = 24
+
+STAGES = {
+    "none": "",
+    "noise, added as it is missing": '[noise]\nprofile = "noise.toml"\n',
+    "noise, textures of 2006": '[noise]\nprofile = "noise.toml"\nmethod = "textures"\n',
+    "copies of 2006, without a minimum": '[motion_blur]\nmethod = "copies"\nmin_length_px = 0.1\n',
+    "antialiasing of 2006": "[antialias]\n",
+    "cartoon of 2005, 240 x 180, 7 iterations": "[cartoon]\n",
+    "cartoon of 2005, 400 x 300, 9 iterations": "[cartoon]\nshrunk_width = 400\nshrunk_height = 300\niterations = 9\n",
+}
+
+PAPERS = """
+| paper, Pentium 4 of 2.7 to 2.8 GHz, GeForce FX 6600 or 6800, 640 x 480 | frames a second | ms of the stage |
+| --- | --- | --- |
+| 2006, without stages | 29.78 | |
+| 2006, noise textures | 29.33 | 0.5 (difference of periods) |
+| 2006, copies, "typical fast motions" | 24.36 | 7.5 (difference of periods) |
+| 2005, cartoon of 240 x 180, 5 / 7 / 9 iterations | 27.84 / 24.22 / 21.51 | 19 / 25 / 30 |
+| 2005, cartoon of 400 x 300, 5 / 7 / 9 iterations | 16.68 / 13.37 / 11.12 | 44 / 59 / 74 |
+"""
+
+
+class Stream:
+    """The video's frames, over and over."""
+
+    def __init__(self, path):
+        self.file = open(path, "rb")
+        self.header = self.file.readline()
+        self.count = (pathlib.Path(path).stat().st_size - len(self.header)) // FRAME_BYTES
+
+    def frame(self, number):
+        self.file.seek(len(self.header) + FRAME_BYTES * (number % self.count))
+        return self.file.read(FRAME_BYTES)
+
+
+def prepare(mixray, data, folder):
+    def run(*words):
+        subprocess.run(words, cwd=folder, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    movie = (data / "webcam_marker_grid_video/movie.mp4").resolve()
+    run("ffmpeg", "-i", movie, "-pix_fmt", "yuv420p", "-f", "yuv4mpegpipe", "video.y4m")
+    run("ffmpeg", "-i", movie, "-frames:v", "1", "first.png")
+    run(mixray, "track", "video.y4m", "--marker-size", "40mm", "-o", "poses.json", "--report", "track.json", "--scene", "board.toml")
+    run(mixray, "noise", "estimate", "first.png", "-o", "noise.toml")
+    text = (folder / "board.toml").read_text()
+    # As docs/live.md advises: else the board's albedo is estimated from each frame.
+    colour = 'material = { base_color = [0.7, 0.7, 0.7] }\n'
+    text = text.replace('name = "board"\n', 'name = "board"\n' + colour)
+    for index, stage in enumerate(STAGES.values()):
+        (folder / f"scene{index}.toml").write_text(text + "\n" + stage)
+    return Stream(folder / "video.y4m")
+
+
+def begin(arguments, folder, index, *more):
+    threads = ["--threads", arguments.threads] if arguments.threads else []
+    words = [arguments.mixray, "live", f"scene{index}.toml", "--board", "track.json", "--intrinsics", "poses.yaml", "--backend", "cpu", "--stats", "stats.json", *threads, *more]
+    return subprocess.Popen(words, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+
+
+def memory_mib(process):
+    status = pathlib.Path(f"/proc/{process.pid}/status").read_text()
+    return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) / 1024
+
+
+def cpu_secs(process):
+    words = pathlib.Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(words[11]) + int(words[12])) / 100
+
+
+def paced(arguments, folder, stream):
+    """A real-time stream; the statistics, and the memory at a sixth, half and the end of it."""
+    process = begin(arguments, folder, 0, "--rpp", "16")
+    reader = threading.Thread(target=lambda: [None for _ in iter(lambda: process.stdout.read(1 << 20), b"")])
+    reader.start()
+    process.stdin.write(stream.header)
+    frames = arguments.seconds * RATE
+    memory = {}
+    start = time.monotonic()
+    for number in range(frames):
+        time.sleep(max(0.0, start + number / RATE - time.monotonic()))
+        process.stdin.write(stream.frame(number))
+        process.stdin.flush()
+        if number in (frames // 6, frames // 2, frames - 1):
+            memory[number] = memory_mib(process)
+    process.stdin.close()
+    reader.join()
+    if process.wait() != 0:
+        sys.exit("mixray live failed")
+    return json.loads((folder / "stats.json").read_text())["total"], list(memory.values())
+
+
+def in_step(arguments, folder, stream, index):
+    """One frame after the other, every fifth of the video; seconds by part over all frames, and of processor time after the first."""
+    process = begin(arguments, folder, index, "--rpp", "1")
+    process.stdin.write(stream.header)
+    for number in range(STEP_FRAMES):
+        process.stdin.write(stream.frame(100 + 5 * number))
+        process.stdin.flush()
+        if number == 0:
+            process.stdout.read(len(stream.header))
+        process.stdout.read(FRAME_BYTES)
+        if number == 0:
+            first = cpu_secs(process)
+    used = cpu_secs(process) - first
+    process.stdin.close()
+    if process.wait() != 0:
+        sys.exit("mixray live failed")
+    return json.loads((folder / "stats.json").read_text())["seconds"], used / (STEP_FRAMES - 1)
+
+
+def measure(arguments, folder):
+    stream = prepare(arguments.mixray, arguments.data, folder)
+    total, memory = paced(arguments, folder, stream)
+    period_ms = 1e3 / RATE
+    frames, age, wait = total["frames"], total["age"], total["wait"]
+    bar = total["work_ms"] + 1.5 * period_ms
+    good = age["p95_ms"] <= bar and wait["p95_ms"] <= 1.5 * period_ms and max(memory) <= 1.1 * memory[0]
+    written = frames["rendered"] + frames["held"] + frames["passed_through"]
+    lines = [f"| {arguments.seconds} s at {RATE} frames a second | bar | |", "| --- | --- | --- |"]
+    lines += [f"| {what} | {limit} | {found} |" for what, limit, found in [
+        ("frames: arrived, written, dropped", "", f"{frames['arrived']}, {written}, {frames['dropped']}"),
+        ("work a frame, mean; rays per pixel", "", f"{total['work_ms']:.0f} ms; {total['rays_per_pixel']:.1f}"),
+        ("age: median, p95, most", f"p95: work + 1.5 periods, {bar:.0f} ms", f"{age['median_ms']:.0f}, {age['p95_ms']:.0f}, {age['most_ms']:.0f} ms"),
+        ("of it waiting: median, p95", f"p95: 1.5 periods, {1.5 * period_ms:.0f} ms", f"{wait['median_ms']:.0f}, {wait['p95_ms']:.0f} ms"),
+        (f"memory after {arguments.seconds // 6}, {arguments.seconds // 2}, {arguments.seconds} s", "flat", ", ".join(f"{mib:.0f}" for mib in memory) + " MiB"),
+    ]]
+    lines += ["", "| stage, at one ray per pixel | ms of the stage | ms of a frame | processor ms of a frame |", "| --- | --- | --- | --- |"]
+    beside = {}
+    for index, name in enumerate(STAGES):
+        seconds, used = in_step(arguments, folder, stream, index)
+        parts = {part: 1e3 * secs / STEP_FRAMES for part, secs in seconds.items()}
+        own = {part: parts.pop(part) for part in list(parts) if part not in ("decode", "track", "edit", "render", "composite", "write")}
+        beside = parts if index == 0 else beside
+        stage = sum(own.values())
+        lines.append(f"| {name} | {stage:.1f} | {stage + sum(parts.values()):.0f} | {1e3 * used:.0f} |")
+    of_which = ", ".join(f"{part} {ms:.1f}" for part, ms in beside.items())
+    lines += ["", f"Without stages, ms by part, the first frame with its trees included: {of_which} (composite: with the filter).", *PAPERS.rstrip().split("\n")]
+    return "\n".join(lines) + "\n", good
+
+
+def main():
+    root = pathlib.Path(__file__).resolve().parents[2]
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--mixray", type=lambda path: str(pathlib.Path(path).resolve()), default=str(root / "target/release/mixray"))
+    parser.add_argument("--data", type=pathlib.Path, default=root / "../shared/data")
+    parser.add_argument("--seconds", type=int, default=60)
+    parser.add_argument("--threads")
+    parser.add_argument("--write", type=pathlib.Path)
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        table, good = measure(arguments, pathlib.Path(folder))
+    print(table)
+    if arguments.write:
+        page = arguments.write.read_text()
+        pattern = re.compile(r"(<!-- live -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+        arguments.write.write_text(pattern.sub(lambda m: m.group(1) + table + m.group(3), page))
+    sys.exit(0 if good else 1)
+
+
+if __name__ == "__main__":
+    main()
