@@ -170,13 +170,14 @@ fn light_that_was_found_serves_another_exposure_and_camera() {
     let (mut scene, photo) = scene();
     let mut packed = PackedScene::build(&scene, &Watcher::none()).expect("packs");
     let (light, _) = estimate_photo_albedo(&mut packed, &photo, &Watcher::none());
-    let largest_error = |packed: &PackedScene, exact: &PackedScene| {
-        let pixels = |packed: &PackedScene| packed.photo_albedo[..32 * 32].to_vec();
-        let pairs = pixels(packed).into_iter().zip(pixels(exact));
-        pairs.fold(0.0, |worst: f32, (a, b)| {
-            let off = (Vec3::from_slice(&a) - Vec3::from_slice(&b)).abs();
-            worst.max(off.max_element())
-        })
+    // Mean over pixels and channels: the light was found by few rays.
+    let mean_error = |packed: &PackedScene, exact: &PackedScene| {
+        let pairs = packed.photo_albedo.iter().zip(&exact.photo_albedo);
+        let errors = pairs.take(32 * 32).map(|(a, b)| {
+            let off = Vec3::from_slice(a) - Vec3::from_slice(b);
+            off.abs().element_sum() / 3.0
+        });
+        errors.sum::<f32>() / (32.0 * 32.0)
     };
     scene.settings.exposure = crate::scene::Exposure::Ev(1.0);
     scene.camera.world_from_camera =
@@ -186,9 +187,9 @@ fn light_that_was_found_serves_another_exposure_and_camera() {
     let build = |anchor| PackedScene::build_at(&scene, anchor, &Watcher::none()).expect("packs");
     let mut exact = build(glam::DVec3::ZERO);
     estimate_photo_albedo(&mut exact, &photo, &Watcher::none());
-    assert!(largest_error(&packed, &exact) > 0.1, "control");
+    assert!(mean_error(&packed, &exact) > 0.1, "control");
     assert!(light.take_up(&mut packed, &photo));
-    let error = largest_error(&packed, &exact);
+    let error = mean_error(&packed, &exact);
     assert!(error < 0.02, "{error}");
     assert!(
         !light.take_up(&mut build(glam::DVec3::X), &photo),
