@@ -14,6 +14,7 @@ mod gltf;
 mod gltf_pictures;
 mod interrupted;
 mod invariants;
+mod light_fit;
 mod live;
 mod overwriting;
 #[cfg(feature = "preview")]

@@ -8,7 +8,9 @@ use serde_json::{Value, json};
 use super::scene_flags::SceneFlags;
 use super::{Failure, Outcome, print, say};
 use crate::files;
-use crate::light_fit::{Fitted, Gain, LightFit, ScaleBasis, edited, fit, residual_picture};
+use crate::light_fit::{
+    FitOptions, Fitted, Gain, LightFit, ScaleBasis, edited, fit, residual_picture,
+};
 use crate::output::{Format, PngBits, Target, check_writable_as, write_image, write_text};
 use crate::work::Watcher;
 
@@ -44,6 +46,12 @@ struct Fit {
     /// All figures of the fit
     #[arg(long, value_name = "FIT.json")]
     stats: Option<PathBuf>,
+    /// Fit a sky that is white all over in place of the scene's environment
+    #[arg(long)]
+    white_sky: bool,
+    /// Leave the environment as it is turned: where it was taken beside the camera
+    #[arg(long)]
+    keep_rotation: bool,
     #[command(flatten)]
     flags: SceneFlags,
 }
@@ -82,8 +90,12 @@ fn run_fit(arguments: &Fit) -> Result<Outcome, Failure> {
     for warning in &scene.warnings {
         say("note", warning);
     }
+    let options = FitOptions {
+        white_sky: arguments.white_sky,
+        keep_rotation: arguments.keep_rotation,
+    };
     let named = |problem: &dyn std::fmt::Display| Failure(format!("{}: {problem}", path.display()));
-    let fit = fit(&scene, &Watcher::none()).map_err(|problem| named(&problem))?;
+    let fit = fit(&scene, options, &Watcher::none()).map_err(|problem| named(&problem))?;
     if let Some(target) = &residual {
         write_image(target, &residual_picture(&fit), PngBits::Eight)?;
     }
@@ -91,6 +103,9 @@ fn run_fit(arguments: &Fit) -> Result<Outcome, Failure> {
         write_text(stats, &format!("{:#}\n", statistics(&fit)))?;
     }
     print(&summary(&fit))?;
+    if fit.gain_of_white_sky.is_real() {
+        say("warning", &white_sky_told(&fit));
+    }
     if fit.is_poor() {
         say("warning", POOR);
         return Ok(Outcome::CheckFailed);
@@ -105,6 +120,13 @@ fn run_fit(arguments: &Fit) -> Result<Outcome, Failure> {
 }
 
 const POOR: &str = "the photograph's shading is not that of this proxy under an environment and a sun: everything is kept, and no scene is written; look at --residual: is the proxy aligned, is it complete, do lamps near by light it?";
+
+fn white_sky_told(fit: &LightFit) -> String {
+    format!(
+        "a sky that is white all over explains {:.0}% more than this environment: it is hardly that of the photograph; try --white-sky, or another environment",
+        100.0 * fit.gain_of_white_sky.share
+    )
+}
 
 /// A scene names its files from its own folder.
 fn check_beside(output: &Path, scene: &Path) -> Result<(), Failure> {
@@ -135,17 +157,26 @@ fn summary(fit: &LightFit) -> String {
         percent(fit.explained.by_white_sky),
     );
     text += &format!(
-        "          {} of parts not fitted to ({:.1} standard errors); spread left {:.3} in ln of luminance\n",
+        "          {} of parts that it was not fitted to ({:.1} standard errors)\n",
         percent(fit.gain.share),
         fit.gain.significance,
-        fit.spread
     );
+    let shadows = &fit.shadows;
+    text += &format!(
+        "shadows   {:.2} of what is around them in the photograph; {:.2} by the fit, {:.2} as the scene has it, {:.2} by a white sky\n",
+        shadows.in_photograph, shadows.fitted, shadows.as_given, shadows.by_white_sky
+    );
+    if fit.is_poor() {
+        return text;
+    }
     text += &match &fit.rotation_deg {
         None => "rotation  kept: the environment is the same from all sides\n".to_owned(),
         Some(rotation) if rotation.is_kept => format!(
-            "rotation  kept at {:.1} degrees: no other explains more{}\n",
+            "rotation  kept at {:.1} degrees{}\n",
             rotation.is,
-            fit.gain_of_rotation.map_or(String::new(), gain_told)
+            fit.gain_of_rotation.map_or(String::new(), |gain| {
+                format!(": no other explains more{}", gain_told(gain))
+            })
         ),
         Some(rotation) => format!(
             "rotation  {:.1} degrees{}, was {:.1}{}\n",
@@ -231,7 +262,15 @@ fn statistics(fit: &LightFit) -> Value {
             "held_out": gain(&fit.gain),
         },
         "poor": fit.is_poor(),
-        "spread_ln": fit.spread,
+        "gain_of_white_sky": gain(&fit.gain_of_white_sky),
+        "is_white_sky": fit.is_white_sky,
+        "shadows_over_around": {
+            "in_photograph": fit.shadows.in_photograph,
+            "fitted": fit.shadows.fitted,
+            "as_given": fit.shadows.as_given,
+            "by_white_sky": fit.shadows.by_white_sky,
+        },
+        "texture_ln": fit.texture,
         "mean_albedo": fit.mean_albedo,
         "scale": fitted(&fit.scale),
         "rotation_deg": fit.rotation_deg.as_ref().map(fitted),

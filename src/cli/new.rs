@@ -10,8 +10,10 @@ use super::terminal::print;
 use super::values::length;
 use super::{Failure, Outcome, render};
 use crate::files;
+use crate::light_fit::{FitOptions, edited, fit};
 use crate::output::{Format, PngBits, Target, write_bytes, write_image, write_text};
 use crate::start::{Ball, DepthUnit, KnownLength, Made, Request, Shadow, compose};
+use crate::work::Watcher;
 
 /// Makes a scene from a photograph: camera, ground, light, and models put down in it
 ///
@@ -97,9 +99,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let made = compose(&arguments.request(), &|path| name_from(&folder, path))?;
     write(&made, &folder)?;
     print(&format!("{}\n", made.summary))?;
+    super::all_threads()?;
+    let has_shape = made.proxy.is_some() || arguments.mesh.is_some();
+    if has_shape && arguments.sun.is_none() {
+        fit_light(&scene, arguments.environment.is_none())?;
+    }
     print(&next_steps(&made, &scene))?;
     if arguments.no_render {
-        return super::all_threads().map(|()| Outcome::Done);
+        return Ok(Outcome::Done);
     }
     // As if it had been typed.
     let mut line = vec!["render".into(), scene.into_os_string(), "-o".into()];
@@ -148,6 +155,29 @@ impl Arguments {
             mesh: self.mesh.clone(),
         }
     }
+}
+
+/// Light as the photograph shows it on a proxy that has a shape. What was taken at the photograph's place stays as it is turned.
+fn fit_light(scene: &Path, keep_rotation: bool) -> Result<(), Failure> {
+    let options = FitOptions {
+        keep_rotation,
+        ..FitOptions::default()
+    };
+    let told = match fit(&crate::scene::load(scene)?, options, &Watcher::none()) {
+        Ok(fit) if fit.is_poor() => "it does not explain the photograph's shading".to_owned(),
+        Ok(fit) => {
+            let text = std::fs::read_to_string(scene)?;
+            write_text(scene, &edited(&text, &fit)?)?;
+            return print(&format!(
+                "Light: fitted to the photograph's shading, of which it explains {:.0}%{}.\n",
+                100.0 * fit.gain.share,
+                (fit.sun.as_ref())
+                    .map_or(String::new(), |sun| format!("; a sun, {}", sun.sureness()))
+            ));
+        }
+        Err(problem) => problem.to_string(),
+    };
+    print(&format!("Light: as guessed; a fit was tried: {told}.\n"))
 }
 
 /// Everything but the scene file first, so that it names nothing that is not there.

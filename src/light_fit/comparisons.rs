@@ -27,8 +27,11 @@ const LEAST_WEIGHT: f32 = 0.1;
 const BLOCKS: [usize; 2] = [8, 6];
 pub const BLOCK_COUNT: usize = BLOCKS[0] * BLOCKS[1];
 pub const FOLDS: usize = 4;
-/// Spread of ln of luminance that no surface goes below.
-const LEAST_SIGMA: f64 = 0.02;
+/// Spread of ln of luminance that no surface goes below, and the half-width in cells of the neighbourhood that tells it.
+const LEAST_TEXTURE: f32 = 0.02;
+const TEXTURE_RADIUS: usize = 3;
+/// Spread of residuals in textures that no fit goes below.
+const LEAST_SIGMA: f64 = 0.5;
 
 /// Two points, or one.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +42,8 @@ struct Term {
     /// ln of the photograph's luminance: of `a` over `b`, or of the irradiance of `a`.
     shown: f32,
     weight: f32,
+    /// Over the spread of the surface's own texture there.
+    inv_texture: f32,
     block: u16,
 }
 
@@ -49,6 +54,8 @@ pub struct Comparisons {
     terms: Vec<Term>,
     /// Some albedo is known, so that the light has a size.
     pub are_absolute: bool,
+    /// Spread of ln of luminance between neighbours, in the median.
+    pub typical_texture: f64,
 }
 
 /// Robust costs by block of the photograph.
@@ -62,18 +69,20 @@ pub fn fold_of(block: usize) -> usize {
 impl Comparisons {
     pub fn of(grid: &Grid) -> Self {
         let mut terms = Vec::new();
+        let mut texture = textures(grid);
         for (a, point) in grid.points.iter().enumerate() {
             let [column, row] = point.cell;
             let block = row * BLOCKS[1] / grid.height * BLOCKS[0] + column * BLOCKS[0] / grid.width;
-            let term = |b, shown: f64, weight| Term {
+            let term = |b, shown: f64, weight, texture: f32| Term {
                 a: a as u32,
                 b,
                 shown: shown as f32,
                 weight,
+                inv_texture: 1.0 / texture,
                 block: block as u16,
             };
             if point.albedo.is_some() {
-                terms.push(term(KNOWN, point.log_shown(), 1.0));
+                terms.push(term(KNOWN, point.log_shown(), 1.0, texture[a]));
                 continue;
             }
             for [dx, dy] in STEPS {
@@ -91,22 +100,35 @@ impl Comparisons {
                 let away = (here[0] - there[0]).powi(2) + (here[1] - there[1]).powi(2);
                 let alike = (-away / (CHROMATICITY * CHROMATICITY)).exp();
                 let shown = point.log_shown() - other.log_shown();
-                terms.push(term(b, shown, alike.max(LEAST_WEIGHT)));
+                let texture = texture[a].hypot(texture[b as usize]);
+                terms.push(term(b, shown, alike.max(LEAST_WEIGHT), texture));
             }
         }
+        let middle = texture.len() / 2;
+        let typical_texture = match texture.is_empty() {
+            true => 0.0,
+            false => *texture.select_nth_unstable_by(middle, f32::total_cmp).1,
+        };
         let are_absolute = terms.iter().any(|term| term.b == KNOWN);
         Self {
             terms,
             are_absolute,
+            typical_texture: f64::from(typical_texture),
         }
     }
 
+    /// ln.
     fn residual(term: &Term, log_light: &[f32]) -> f32 {
         let light = log_light[term.a as usize];
         match term.b {
             KNOWN => term.shown - light,
             b => term.shown - (light - log_light[b as usize]),
         }
+    }
+
+    /// Over the texture.
+    fn scaled_residual(term: &Term, log_light: &[f32]) -> f32 {
+        Self::residual(term, log_light) * term.inv_texture
     }
 
     /// Of what light is missing where the albedo is known, ln; `None`: it is known nowhere.
@@ -126,7 +148,7 @@ impl Comparisons {
         let mut costs = [0.0; BLOCK_COUNT];
         let inv = (1.0 / (sigma * sigma)) as f32;
         for term in self.terms.iter().step_by(stride) {
-            let r = Self::residual(term, log_light);
+            let r = Self::scaled_residual(term, log_light);
             costs[usize::from(term.block)] += f64::from(term.weight * (r * r * inv).ln_1p());
         }
         costs
@@ -136,10 +158,10 @@ impl Comparisons {
         self.costs(log_light, sigma, stride).iter().sum()
     }
 
-    /// Of the residuals, from their median absolute value.
+    /// Of the residuals in textures, from their median absolute value.
     pub fn spread(&self, log_light: &[f32]) -> f64 {
         let mut sizes: Vec<f32> = (self.terms.par_iter())
-            .map(|term| Self::residual(term, log_light).abs())
+            .map(|term| Self::scaled_residual(term, log_light).abs())
             .collect();
         if sizes.is_empty() {
             return LEAST_SIGMA;
@@ -160,14 +182,14 @@ impl Comparisons {
         };
         let mut row = vec![0.0f64; n];
         for term in &self.terms {
-            let r = Self::residual(term, log_light);
+            let r = Self::scaled_residual(term, log_light);
             let weight = f64::from(term.weight / (1.0 + r * r * inv));
             for (value, slope) in row.iter_mut().zip(slopes) {
                 let here = slope[term.a as usize];
                 *value = f64::from(match term.b {
                     KNOWN => here,
                     b => here - slope[b as usize],
-                });
+                }) * f64::from(term.inv_texture);
             }
             let gradient = &mut sums.gradients[usize::from(term.block)];
             for i in 0..n {
@@ -179,6 +201,38 @@ impl Comparisons {
         }
         sums
     }
+}
+
+/// Spread of ln of luminance from cell to cell about each point: what of its neighbours' differences is albedo and noise.
+fn textures(grid: &Grid) -> Vec<f32> {
+    let step_to = |cell: usize, other: usize| {
+        let [here, there] = [cell, other].map(|cell| grid.point_of_cell[cell]);
+        let (here, there) = here.zip(there)?;
+        let [here, there] = [here, there].map(|point| &grid.points[point as usize]);
+        Some((here.log_shown() - there.log_shown()).abs() as f32)
+    };
+    let around = |at: usize, count: usize| {
+        at.saturating_sub(TEXTURE_RADIUS)..(at + TEXTURE_RADIUS + 1).min(count - 1)
+    };
+    (grid.points.par_iter())
+        .map(|point| {
+            let [column, row] = point.cell;
+            let mut steps = Vec::new();
+            for y in around(row, grid.height) {
+                for x in around(column, grid.width) {
+                    let cell = y * grid.width + x;
+                    steps.extend(step_to(cell, cell + 1));
+                    steps.extend(step_to(cell, cell + grid.width));
+                }
+            }
+            if steps.is_empty() {
+                return LEAST_TEXTURE;
+            }
+            let middle = steps.len() / 2;
+            let median = *steps.select_nth_unstable_by(middle, f32::total_cmp).1;
+            (1.4826 * median * std::f32::consts::FRAC_1_SQRT_2).max(LEAST_TEXTURE)
+        })
+        .collect()
 }
 
 /// Normal equations of the parameters.

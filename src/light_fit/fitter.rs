@@ -143,6 +143,15 @@ impl Fitter<'_> {
         best.expect("some strength is tried")
     }
 
+    /// Surroundings that are none of the environment's.
+    pub fn of_light(&self, surroundings: &[f32]) -> Candidate {
+        Candidate {
+            rotation_deg: 0.0,
+            sun: None,
+            costs: self.costs(surroundings, None),
+        }
+    }
+
     /// No light that differs from point to point.
     pub fn flat(&self) -> Costs {
         let light = vec![1.0; self.fixed.len()];
@@ -264,7 +273,12 @@ impl Fitter<'_> {
     }
 
     /// Standard deviations: the sandwich of White (1980), with blocks of the photograph for independent errors (Liang and Zeger 1986).
-    pub fn uncertainty(&self, rotation_deg: f64, sun: Option<Sun>, scale: f64) -> Uncertainty {
+    pub fn uncertainty(
+        &self,
+        (rotation_deg, turns): (f64, bool),
+        sun: Option<Sun>,
+        scale: f64,
+    ) -> Uncertainty {
         let log_light = |rotation_deg: f64, sun: Option<Sun>, scale: f64| {
             let surroundings = self.surroundings_at(rotation_deg);
             let points = &self.grid.points;
@@ -289,7 +303,7 @@ impl Fitter<'_> {
             let at = |factor: f64| log_light(rotation_deg, sun, scale * factor);
             slopes.push(slope(at((-0.01f64).exp()), at(0.01f64.exp()), 0.01));
         }
-        if self.surroundings.len() > 1 {
+        if turns {
             names.push(Parameter::Rotation);
             let at = |step: f64| log_light(rotation_deg + step, sun, scale);
             slopes.push(slope(

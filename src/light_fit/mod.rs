@@ -26,6 +26,15 @@ use glam::DVec3;
 
 use points::Grid;
 
+/// What is fitted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FitOptions {
+    /// A sky that is white all over in place of the scene's environment.
+    pub white_sky: bool,
+    /// The environment stays as it is turned: it was taken there, or is the photograph itself.
+    pub keep_rotation: bool,
+}
+
 /// The light that explains most of the photograph.
 pub struct LightFit {
     /// Points of the proxy that were compared, and cells of it that were left out: clipped, dark, or at its edges.
@@ -45,8 +54,14 @@ pub struct LightFit {
     pub explained: Explained,
     /// Gain of the fit over no shading, in parts that it has not seen.
     pub gain: Gain,
-    /// Spread of ln of luminance between points of like colour that no light explains.
-    pub spread: f64,
+    /// What a sky that is white all over would explain more than the fit.
+    pub gain_of_white_sky: Gain,
+    /// The surroundings are a white sky in place of the scene's environment.
+    pub is_white_sky: bool,
+    /// How dark the proxy's shadows are.
+    pub shadows: Shadows,
+    /// Spread of ln of luminance between neighbours, in the median: texture and noise.
+    pub texture: f64,
     /// Mean reflectance of the proxy under the fitted light.
     pub mean_albedo: f64,
     pub grid: Arc<Grid>,
@@ -106,10 +121,20 @@ pub struct Explained {
     pub fitted: f64,
 }
 
+/// In the twentieth of the points that the proxy hides most from a white sky, compared with what is around them: luminance over that around, in the
+/// median.
+#[derive(Clone, Copy, Debug)]
+pub struct Shadows {
+    pub in_photograph: f64,
+    pub as_given: f64,
+    pub by_white_sky: f64,
+    pub fitted: f64,
+}
+
 impl LightFit {
     /// The photograph's shading is not that of the proxy under any such light.
     pub fn is_poor(&self) -> bool {
-        !self.gain.is_real()
+        !self.gain.is_enough()
     }
 }
 

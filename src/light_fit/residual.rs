@@ -76,7 +76,8 @@ fn left_over(fit: &LightFit) -> Vec<f32> {
         .collect()
 }
 
-fn median_around(grid: &Grid, over: &[f32], at: usize) -> f32 {
+/// Of the point's own kind.
+pub fn median_around(grid: &Grid, over: &[f32], at: usize) -> f32 {
     let [column, row] = grid.points[at].cell;
     let own = grid.points[at].chromaticity();
     let mut around = vec![over[at]];

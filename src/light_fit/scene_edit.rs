@@ -18,14 +18,15 @@ pub fn edited(text: &str, fit: &LightFit) -> Result<String, Refusal> {
 }
 
 fn edit_environment(document: &mut DocumentMut, fit: &LightFit) {
-    let is_new = !document.contains_key("environment");
     let item = document
         .entry("environment")
         .or_insert(Item::Table(Table::new()));
     let Some(table) = item.as_table_like_mut() else {
         return;
     };
-    if is_new {
+    if fit.is_white_sky {
+        table.remove("image");
+        table.remove("rotation_deg");
         table.insert("radiance", value(numbers([1.0; 3])));
     }
     if !fit.scale.is_kept {

@@ -7,8 +7,9 @@ use super::directions::{directions, light_by_rotation};
 use super::fitter::{Candidate, Fitter, STRIDE, Strengths, Sun};
 use super::points::Grid;
 use super::rays::{Openness, sunlight};
+use super::residual::median_around;
 use super::verdict::Gain;
-use super::{Explained, Fitted, FittedSun, LightFit, ScaleBasis};
+use super::{Explained, FitOptions, Fitted, FittedSun, LightFit, ScaleBasis, Shadows};
 use crate::math::luminance;
 use crate::packed::{MATERIAL_PHOTO_ALBEDO, NONE, PHOTO_PATCHES, PackedScene};
 use crate::refusal::Refusal;
@@ -22,13 +23,19 @@ const ALBEDO_BELIEVED: [f64; 2] = [0.15, 0.65];
 const ALBEDO_GUESSED: f64 = 0.4;
 /// Rounds of sun and rotation in turns, each with the spread that the round before has left.
 const ROUNDS: usize = 2;
-const BLACK: &str = "a black environment";
+/// What the grids of directions and points cannot tell, standard deviations in degrees; where the albedo is not known neither is how much light comes from
+/// the proxy itself, which turned rotations by more.
+const ROTATION_GRID_DEG: f64 = 1.5;
+const ROTATION_UNKNOWN_ALBEDO_DEG: f64 = 6.0;
+const SUN_GRID_DEG: f64 = 0.5;
+/// One point of so many counts as shadowed.
+const SHADOWED: usize = 20;
 
 /// Fits the light of the scene to its photograph.
 ///
 /// # Errors
 /// There is no photograph or too little proxy in it, or lamps of the real world whose light is not fitted.
-pub fn fit(scene: &Scene, watcher: &Watcher<'_>) -> Result<LightFit, Refusal> {
+pub fn fit(scene: &Scene, options: FitOptions, watcher: &Watcher<'_>) -> Result<LightFit, Refusal> {
     let Some(photo) = &scene.photo else {
         return Err(
             "it has no photograph; expected one whose light is sought; name it as `image` in [photo]"
@@ -56,21 +63,21 @@ pub fn fit(scene: &Scene, watcher: &Watcher<'_>) -> Result<LightFit, Refusal> {
         rotation_deg: 0.0,
         scale: 1.0,
     };
-    let environment = scene.environment.as_ref().unwrap_or(&white);
+    let own = scene.environment.as_ref().filter(|_| !options.white_sky);
+    let environment = own.unwrap_or(&white);
     let irradiance = |environment: &Environment| {
         let light = light_by_rotation(environment, &directions);
         openness.irradiance(&grid.points, &directions, &light)
     };
     let surroundings = irradiance(environment);
     if surroundings.iter().flatten().all(|light| *light == 0.0) {
-        return Err(format!(
-            "no light of its environment reaches the proxy: {BLACK}; expected light; give [environment] a `radiance` or an `image`"
-        )
-        .into());
+        return Err("its environment is black where it could light the proxy; expected light; give [environment] a `radiance` or an `image`".into());
     }
     let mut search = Search {
         scene,
+        keeps_rotation: options.keep_rotation,
         environment,
+        is_white_sky: own.is_none(),
         white_sky: irradiance(&white).swap_remove(0),
         fitter: Fitter {
             scene: &packed,
@@ -109,6 +116,8 @@ fn real_world(scene: &Scene, watcher: &Watcher<'_>) -> Result<PackedScene, Refus
 struct Search<'a> {
     scene: &'a Scene,
     environment: &'a Environment,
+    is_white_sky: bool,
+    keeps_rotation: bool,
     white_sky: Vec<f32>,
     fitter: Fitter<'a>,
 }
@@ -134,7 +143,7 @@ impl Search<'_> {
         };
         let (given, basis) = self.as_given();
         let given_deg = self.environment.rotation_deg;
-        let turns = self.fitter.surroundings.len() > 1;
+        let turns = self.fitter.surroundings.len() > 1 && !self.keeps_rotation;
         let mut rotation_deg = given_deg;
         if turns {
             rotation_deg = least(&self.fitter.rotations(None)).rotation_deg;
@@ -183,13 +192,22 @@ impl Search<'_> {
             None => vec![self.fitter.candidate(rotation_deg, None)],
         };
         let gain = Gain::over_flat(&candidates, &flat);
+        let white = [self.fitter.of_light(&self.white_sky)];
+        let gain_of_white_sky = Gain::of(&white, &candidates, &flat);
         let strengths = self.strengths(rotation_deg, sun);
         let sun = sun.map(|sun| Sun {
             ratio: strengths.ratio,
             ..sun
         });
-        let errors = self.fitter.uncertainty(rotation_deg, sun, strengths.scale);
+        let errors = self
+            .fitter
+            .uncertainty((rotation_deg, turns), sun, strengths.scale);
         let scale = self.scene_scale(strengths.scale);
+        let model_deg = match self.fitter.comparisons.are_absolute {
+            true => ROTATION_GRID_DEG,
+            false => ROTATION_UNKNOWN_ALBEDO_DEG,
+        };
+        let is_map = self.fitter.surroundings.len() > 1;
         LightFit {
             points: grid.points.len(),
             left_out: grid.left_out,
@@ -200,11 +218,11 @@ impl Search<'_> {
                 is_kept: basis == ScaleBasis::Exposure,
             },
             scale_basis: basis,
-            rotation_deg: turns.then(|| match gain_of_rotation.is_some_and(|g| g.is_real()) {
+            rotation_deg: is_map.then(|| match gain_of_rotation.is_some_and(|g| g.is_real()) {
                 true => Fitted {
                     was: given_deg,
                     is: rotation_deg,
-                    sigma: errors.rotation_deg,
+                    sigma: errors.rotation_deg.map(|sigma| sigma.hypot(model_deg)),
                     is_kept: false,
                 },
                 false => Fitted::kept(given_deg),
@@ -212,14 +230,17 @@ impl Search<'_> {
             sun: sun.map(|sun| FittedSun {
                 direction: -sun.direction.as_dvec3(),
                 irradiance: scale * sun.ratio,
-                direction_sigma_deg: errors.sun_deg,
+                direction_sigma_deg: errors.sun_deg.map(|sigma| sigma.hypot(SUN_GRID_DEG)),
                 irradiance_sigma: errors.log_ratio,
             }),
             gain_of_sun,
             gain_of_rotation,
             explained: self.explained(&given, &strengths.log_light, &flat),
             gain,
-            spread: self.fitter.sigma,
+            gain_of_white_sky,
+            is_white_sky: self.is_white_sky,
+            shadows: self.shadows(&given, &strengths.log_light),
+            texture: self.fitter.comparisons.typical_texture,
             mean_albedo: self.mean_albedo(&strengths.log_light),
             log_light: strengths.log_light,
             grid: Arc::clone(grid),
@@ -288,7 +309,7 @@ impl Search<'_> {
     fn without_sun(&self, turns: bool) -> Vec<Candidate> {
         match turns {
             true => self.fitter.rotations(None),
-            false => vec![self.fitter.candidate(0.0, None)],
+            false => vec![self.fitter.candidate(self.environment.rotation_deg, None)],
         }
     }
 
@@ -316,6 +337,33 @@ impl Search<'_> {
             Exposure::Ev(ev) => scale / ev.exp2(),
             Exposure::Auto if self.environment.scale > 0.0 => self.environment.scale,
             Exposure::Auto => 1.0,
+        }
+    }
+
+    fn shadows(&self, given: &[f32], fitted: &[f32]) -> Shadows {
+        let grid = self.fitter.grid;
+        let over_around = |log: &[f32]| -> Vec<f32> {
+            let points = 0..log.len();
+            points
+                .map(|at| log[at] - median_around(grid, log, at))
+                .collect()
+        };
+        let of_light = |light: &[f32]| over_around(&self.fitter.strengths(light, None).log_light);
+        let by_white_sky = of_light(&self.white_sky);
+        let mut darkest: Vec<usize> = (0..by_white_sky.len()).collect();
+        darkest.sort_by(|a, b| by_white_sky[*a].total_cmp(&by_white_sky[*b]));
+        darkest.truncate(darkest.len().div_ceil(SHADOWED));
+        let median = |over: &[f32]| {
+            let mut values: Vec<f32> = darkest.iter().map(|at| over[*at]).collect();
+            let middle = values.len() / 2;
+            f64::from(*values.select_nth_unstable_by(middle, f32::total_cmp).1).exp()
+        };
+        let shown: Vec<f32> = (grid.points.iter()).map(|p| p.log_shown() as f32).collect();
+        Shadows {
+            in_photograph: median(&over_around(&shown)),
+            as_given: median(&of_light(given)),
+            by_white_sky: median(&by_white_sky),
+            fitted: median(&over_around(fitted)),
         }
     }
 
