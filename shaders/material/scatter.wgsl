@@ -45,9 +45,8 @@ fn terminator(ng: vec3<f32>, ns: vec3<f32>, wi: vec3<f32>) -> f32 {
     if of_facet >= of_smooth * NO_FADE {
         return 1.0;
     }
-    let lower = 1.0 - of_facet / of_smooth;
-    let lower2 = lower * lower;
-    return 1.0 - lower2 * lower2;
+    let g = of_facet / of_smooth;
+    return g * (1.0 + g - g * g);
 }
 
 fn kept_at_terminator(s: Surface, wi: vec3<f32>) -> f32 {

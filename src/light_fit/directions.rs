@@ -61,30 +61,39 @@ pub fn light_by_rotation(environment: &Environment, directions: &[Vec3]) -> Vec<
         .collect()
 }
 
-/// Luminance times solid angle by cell of the grid: means over texels.
+/// Luminance times solid angle by cell of the grid: each texel's goes to the cells that it covers, in proportion.
 fn cell_light((width, height): (usize, usize), texels: &[[f32; 3]]) -> Vec<f32> {
-    let [across, down] = [width.div_ceil(COLUMNS), height.div_ceil(ROWS)].map(|n| n.max(2));
-    let edge = |row: f64| (row / ROWS as f64 * PI).cos();
-    let texel = |at: f64, cells: usize, count: usize| {
-        ((at / cells as f64 * count as f64) as usize).min(count - 1)
-    };
-    (0..COLUMNS * ROWS)
-        .map(|cell| {
-            let (column, row) = ((cell % COLUMNS) as f64, (cell / COLUMNS) as f64);
-            let mut sum = 0.0;
-            for j in 0..down {
-                let top = row + j as f64 / down as f64;
-                let solid_angle =
-                    (edge(top) - edge(top + 1.0 / down as f64)) * TAU / (COLUMNS * across) as f64;
-                let y = texel(top + 0.5 / down as f64, ROWS, height);
-                for i in 0..across {
-                    let x = texel(column + (i as f64 + 0.5) / across as f64, COLUMNS, width);
-                    sum += solid_angle * f64::from(luminance(texels[y * width + x].into()));
+    let mut light = vec![0.0; COLUMNS * ROWS];
+    for (y, texel_row) in texels.chunks(width).enumerate() {
+        for (row, top, bottom) in covered(y, height, ROWS) {
+            let band = TAU * ((top * PI).cos() - (bottom * PI).cos());
+            for (x, texel) in texel_row.iter().enumerate() {
+                let radiance = f64::from(luminance((*texel).into()));
+                for (column, left, right) in covered(x, width, COLUMNS) {
+                    light[row * COLUMNS + column] += radiance * band * (right - left);
                 }
             }
-            sum as f32
-        })
-        .collect()
+        }
+    }
+    light.into_iter().map(|light| light as f32).collect()
+}
+
+/// The cells, of so many, that one texel of a line of texels covers, each with the ends of what it covers of it, 0..1 along the line.
+fn covered(texel: usize, texels: usize, cells: usize) -> impl Iterator<Item = (usize, f64, f64)> {
+    let share = |index: usize, count: usize| index as f64 / count as f64;
+    let (start, end) = (share(texel, texels), share(texel + 1, texels));
+    // Whole numbers, so that no cell is missed by rounding.
+    let (first, last) = (
+        texel * cells / texels,
+        ((texel + 1) * cells).div_ceil(texels),
+    );
+    (first..last).map(move |cell| {
+        (
+            cell,
+            start.max(share(cell, cells)),
+            end.min(share(cell + 1, cells)),
+        )
+    })
 }
 
 /// Of the centre of each cell of the grid, in the world's azimuths: the centre column is -Z.

@@ -2,47 +2,12 @@
 
 use glam::Vec3;
 
+use super::blur::{Blur, FOOTPRINT_MARGIN, Sphere};
 use super::patch::{Patch, in_world};
 use crate::camera::lens::is_wide;
 use crate::camera::shutter::{CameraPose, camera_pose, camera_pose_at};
 use crate::math::normalize3;
 use crate::packed::{FRAME_SHUTTER, Frame, SHUTTER_POSES};
-
-/// A centre, and a radius in metres.
-pub type Sphere = (Vec3, f32);
-
-/// How far the rays of a pixel lie from the pinhole ray through its centre.
-#[derive(Clone, Copy, Debug)]
-pub struct Blur {
-    /// Pixel footprint at axis depth 1, metres.
-    footprint: f32,
-    aperture_radius: f32,
-    inv_focus_distance: f32,
-    /// How far the camera moves from where it is in the middle of the row's exposure, metres.
-    shake: f32,
-}
-
-impl Blur {
-    /// Of a camera that rests; `footprint`: at axis depth 1, metres.
-    pub fn of(frame: &Frame, footprint: f32) -> Self {
-        Self {
-            footprint,
-            aperture_radius: frame.aperture_radius * SQUARE_REACH,
-            inv_focus_distance: frame.inv_focus_distance,
-            shake: 0.0,
-        }
-    }
-
-    /// Largest distance from the centre ray over the axis depths z0..z1; convex in z, so the ends decide.
-    pub fn radius(&self, z0: f32, z1: f32) -> f32 {
-        let blur = |z: f32| {
-            self.aperture_radius * (1.0 - z * self.inv_focus_distance).abs()
-                + self.footprint * z.max(0.0)
-                + self.shake
-        };
-        blur(z0.max(0.0)).max(blur(z1.max(0.0)))
-    }
-}
 
 /// All rays of one pixel: at axis depth z they lie within `blur.radius(z)` of the pinhole ray through the pixel's centre.
 pub struct Beam {
@@ -55,11 +20,6 @@ pub struct Beam {
     /// Of a fisheye without an aperture, whose rays may look back: the half-angle of the cone that holds them, radians.
     cone: Option<f32>,
 }
-
-/// Rounding and the curvature of the distortion inside one pixel.
-pub const FOOTPRINT_MARGIN: f32 = 1.1;
-/// A square of half-width 1 reaches this far.
-const SQUARE_REACH: f32 = std::f32::consts::SQRT_2;
 
 /// Of unit vectors, radians; precise where it is small.
 fn angle_between(a: Vec3, b: Vec3) -> f32 {
@@ -130,10 +90,7 @@ impl Beam {
             origin: middle.position,
             direction,
             axis,
-            blur: Blur {
-                shake: shake * FOOTPRINT_MARGIN,
-                ..Blur::of(frame, footprint * FOOTPRINT_MARGIN)
-            },
+            blur: Blur::of(frame, footprint * FOOTPRINT_MARGIN).shaken(shake * FOOTPRINT_MARGIN),
             cone,
         }
     }

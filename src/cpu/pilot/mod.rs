@@ -7,6 +7,7 @@
 mod allocation;
 mod beam;
 mod blocks;
+mod blur;
 mod highlights;
 mod importance;
 mod measurement;

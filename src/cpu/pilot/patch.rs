@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::beam::{Blur, FOOTPRINT_MARGIN, Sphere};
+use super::blur::{Blur, FOOTPRINT_MARGIN, Sphere};
 use crate::camera::lens::{coefficients, is_wide, lens_undistort};
 use crate::camera::shutter::CameraPose;
 use crate::distortion::{LENS_FISHEYE, fisheye_direction};

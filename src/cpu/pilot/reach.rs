@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::beam::{Beam, Sphere};
+use super::beam::Beam;
+use super::blur::Sphere;
 use super::patch::{Certainty, Patch};
 use crate::camera::shutter::camera_pose;
 use crate::packed::{Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PackedScene};
