@@ -38,14 +38,14 @@ fn lambert_cos(ng: vec3<f32>, ns: vec3<f32>, wi: vec3<f32>) -> f32 {
 
 fn terminator(ng: vec3<f32>, ns: vec3<f32>, wi: vec3<f32>) -> f32 {
     let of_facet = dot3(ng, wi);
-    let of_smooth = dot3(ns, wi) * dot3(ng, ns);
-    if of_facet <= 0.0 || of_smooth <= 0.0 {
+    let end = FADE * dot3(ns, wi) * dot3(ng, ns);
+    if of_facet <= 0.0 || end <= 0.0 {
         return 0.0;
     }
-    if of_facet >= of_smooth * NO_FADE {
+    if of_facet >= end {
         return 1.0;
     }
-    let g = of_facet / of_smooth;
+    let g = of_facet / end;
     return g * (1.0 + g - g * g);
 }
 

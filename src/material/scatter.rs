@@ -11,8 +11,8 @@ use crate::shared::shared;
 shared! {
     /// A mirrored or refracted direction that rounding put on the wrong side of the surface is lifted to this height.
     const GRAZING_LIFT: f32 = 1e-4;
-    /// Facets whose cosine is this much of the smooth surface's fade no light: the share would differ from 1 by rounding alone.
-    const NO_FADE: f32 = 0.9999;
+    /// Facets whose cosine is this much of the smooth surface's, or more, fade no light.
+    const FADE: f32 = 0.5;
 
     /// Non-delta lobes for one pair of directions.
     #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,18 +94,18 @@ pub fn lambert_cos(ng: Vec3, ns: Vec3, wi: Vec3) -> f32 {
 }
 
 /// Share of the light that the facets of a smooth mesh keep, so that it fades towards the horizon of each instead of ending there. After Chiang, Li
-/// and Burley 2019, "Taming the shadow terminator", but by 1 - (1 - g)^4 where they have g + g^2 - g^3, which takes 0.2% of the light from the
-/// side off a sphere of 160 segments. The tilt of a normal map is real, and fades nothing.
+/// and Burley 2019, "Taming the shadow terminator", but over half the cosine: over all of it 0.2% of the light from the side is lost by a sphere of
+/// 160 segments. The tilt of a normal map is real, and fades nothing.
 pub fn terminator(ng: Vec3, ns: Vec3, wi: Vec3) -> f32 {
     let of_facet = ng.dot(wi);
-    let of_smooth = ns.dot(wi) * ng.dot(ns);
-    if of_facet <= 0.0 || of_smooth <= 0.0 {
+    let end = FADE * ns.dot(wi) * ng.dot(ns);
+    if of_facet <= 0.0 || end <= 0.0 {
         return 0.0;
     }
-    if of_facet >= of_smooth * NO_FADE {
+    if of_facet >= end {
         return 1.0;
     }
-    let g = of_facet / of_smooth;
+    let g = of_facet / end;
     g * (1.0 + g - g * g)
 }
 

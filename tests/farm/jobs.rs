@@ -224,7 +224,7 @@ fn what_makes_no_job_is_refused() {
         (job("make", &format!("{video} --ranges 2")), "--ranges"),
         (
             job("make", "").replace("scene.toml", "none.toml"),
-            "none.toml: cannot be read",
+            "none.toml: the scene file cannot be read",
         ),
         (job("make", "--ranges 2 --stats a.json"), "--stats"),
         (
