@@ -202,10 +202,7 @@ fn a_photograph_of_something_else_is_told_and_changes_nothing() {
 fn what_cannot_be_fitted_is_refused() {
     let folder = folder();
     folder.save("photo.png", 96, 72, |x, _| [x as u8 + 60; 3]);
-    folder.write(
-        "scene.toml",
-        scene("photo.png", &environment(0.0, 1.0), false),
-    );
+    folder.write("scene.toml", scene("photo.png", WHITE, true));
     folder.create("other");
     folder.refuse(
         "light fit scene.toml -o other/new.toml",
