@@ -124,8 +124,11 @@ impl PhotoLight {
             return None;
         }
         let at = camera_project(&self.frame, point.position);
+        if !at.valid {
+            return None;
+        }
         let pixel = at.py as usize * self.frame.width as usize + at.px as usize;
-        let there = at.valid.then(|| self.seen[pixel].depth_m)?;
+        let there = self.seen[pixel].depth_m;
         ((there - at.depth).abs() < DEPTH_TOLERANCE * at.depth).then(|| self.light[pixel])
     }
 
