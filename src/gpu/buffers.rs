@@ -147,8 +147,7 @@ impl SceneBuffers {
 
     /// Replaces the frame (camera, lens and sampling) by that of `parts`, whose arrays are those that are here.
     pub fn set_frame(&self, gpu: &GpuDevice, parts: &SceneParts<'_>) {
-        gpu.queue
-            .write_buffer(&self.frame, 0, bytemuck::bytes_of(&with_bases(parts)));
+        gpu.write(&self.frame, 0, bytemuck::bytes_of(&with_bases(parts)));
     }
 
     /// The buffer of that name in `shaders/gpu/buffers.wgsl`.
@@ -186,7 +185,7 @@ impl Array<'_> {
         let mut offset = 0;
         for (changed_by, bytes) in &self.pieces {
             if *changed_by <= changed {
-                gpu.queue.write_buffer(buffer, offset, bytes);
+                gpu.write(buffer, offset, bytes);
             }
             offset += bytes.len() as u64;
         }

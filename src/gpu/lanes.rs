@@ -230,7 +230,7 @@ impl Lanes {
     }
 
     pub fn upload(&self, gpu: &GpuDevice, work: &[PixelWork], gathered: &Gathered) {
-        let write = |buffer, bytes| gpu.queue.write_buffer(buffer, 0, bytes);
+        let write = |buffer, bytes| gpu.write(buffer, 0, bytes);
         write(&self.work, bytemuck::cast_slice(work));
         write(&self.pixel_sums, bytemuck::cast_slice(&gathered.sums));
         write(&self.guide_sums, bytemuck::cast_slice(&gathered.guides));
@@ -238,7 +238,7 @@ impl Lanes {
     }
 
     pub fn clear_counters(&self, gpu: &GpuDevice) {
-        (gpu.queue).write_buffer(&self.counters, 0, &[0; COUNTERS_BYTES as usize]);
+        gpu.write(&self.counters, 0, &[0; COUNTERS_BYTES as usize]);
     }
 
     pub fn copy_counters(&self, encoder: &mut wgpu::CommandEncoder) {
@@ -271,7 +271,15 @@ impl Lanes {
         Ok(bytemuck::pod_read_unaligned(&bytes))
     }
 
-    /// What [`Lanes::copy_counters`] and [`Lanes::copy_sums`] copied; no guides or groups unless there are any.
+    /// Waits for what [`Lanes::copy_counters`] and [`Lanes::copy_sums`] copied.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn wait_for_sums(&self, gpu: &GpuDevice, pixels: usize) -> Result<(), GpuError> {
+        gpu.map(&self.staging, self.read_bytes(pixels))
+    }
+
+    /// After [`Lanes::wait_for_sums`]; no guides or groups unless there are any.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
@@ -280,16 +288,21 @@ impl Lanes {
         gpu: &GpuDevice,
         pixels: usize,
     ) -> Result<(Counters, Gathered), GpuError> {
-        let [sums, guides, groups] = self.sums_bytes(pixels);
-        let bytes = gpu.read(&self.staging, COUNTERS_BYTES + sums + guides + groups)?;
-        let (counters, rest) = bytes.split_at(COUNTERS_BYTES as usize);
-        let (sums, rest) = rest.split_at(sums as usize);
-        let (guides, groups) = rest.split_at(guides as usize);
-        let gathered = Gathered {
-            sums: bytemuck::pod_collect_to_vec(sums),
-            guides: bytemuck::pod_collect_to_vec(guides),
-            groups: bytemuck::pod_collect_to_vec(groups),
-        };
-        Ok((bytemuck::pod_read_unaligned(counters), gathered))
+        let [sums, guides, _] = self.sums_bytes(pixels);
+        gpu.take_mapped(&self.staging, self.read_bytes(pixels), |bytes| {
+            let (counters, rest) = bytes.split_at(COUNTERS_BYTES as usize);
+            let (sums, rest) = rest.split_at(sums as usize);
+            let (guides, groups) = rest.split_at(guides as usize);
+            let gathered = Gathered {
+                sums: bytemuck::pod_collect_to_vec(sums),
+                guides: bytemuck::pod_collect_to_vec(guides),
+                groups: bytemuck::pod_collect_to_vec(groups),
+            };
+            (bytemuck::pod_read_unaligned(counters), gathered)
+        })
+    }
+
+    fn read_bytes(&self, pixels: usize) -> u64 {
+        COUNTERS_BYTES + self.sums_bytes(pixels).iter().sum::<u64>()
     }
 }

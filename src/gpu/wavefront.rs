@@ -19,7 +19,7 @@ use crate::film::Film;
 use crate::packed::PackedScene;
 use crate::shared::WORKGROUP;
 use crate::work::list::TILE_PLACES;
-use crate::work::{Pass, PhotonWork, PixelWork, RayCounts, Watcher, WorkList};
+use crate::work::{Pass, PhotonWork, PixelWork, Place, Places, RayCounts, Watcher, WorkList};
 
 /// Samples of one pixel in a batch at most, so that a batch has pixels enough to sum in parallel.
 const MOST_SAMPLES: u32 = 256;
@@ -45,6 +45,7 @@ pub struct GpuBackend {
     /// The first submission compiles the kernels, and says nothing about speed.
     warm: bool,
     profiler: Option<Profiler>,
+    places: Places,
     batches_until_loss: Option<u32>,
     /// The kernels hold no more than the scene needs.
     specialised: bool,
@@ -181,6 +182,7 @@ impl GpuBackend {
             pacer,
             warm: false,
             profiler: None,
+            places: Places::default(),
             batches_until_loss: None,
             specialised: true,
         })
@@ -207,6 +209,16 @@ impl GpuBackend {
         self.profiler.as_ref().map(|profiler| profiler.seconds)
     }
 
+    /// Books the host's time from now on.
+    pub fn set_places(&mut self, places: Places) {
+        self.places = places;
+    }
+
+    /// Where the host's time went.
+    pub fn places(&self) -> &Places {
+        &self.places
+    }
+
     /// For tests: the device is destroyed before its n-th batch from now.
     #[doc(hidden)]
     pub fn lose_device_after(&mut self, batches: u32) {
@@ -226,6 +238,7 @@ impl GpuBackend {
         rays: &mut RayCounts,
         watcher: &Watcher<'_>,
     ) -> Result<(), GpuError> {
+        let begun = self.places.begin();
         // Pixels that share a batch take equally many samples of it: no lanes stay empty. Those of a sharing tile lie together.
         let mut pixels = work.pixels.clone();
         let tile = |work: &PixelWork| tile_of(film.width, work.pixel);
@@ -237,6 +250,7 @@ impl GpuBackend {
                 work.tile = place + TILE_PLACES * count;
             }
         }
+        self.places.end(Place::List, begun);
         let mut rest = pixels.as_slice();
         while !rest.is_empty() && !watcher.is_cancelled() {
             let lanes = self.pacer.lanes();
@@ -270,7 +284,7 @@ impl GpuBackend {
                 &self.scene,
             )?),
         };
-        photons.render(&self.gpu, film, work, rays, watcher)
+        photons.render(&self.gpu, film, work, rays, &mut self.places, watcher)
     }
 
     /// Makes room for `wanted` lanes, or for as many as there is memory for; returns how many may be used.
@@ -333,7 +347,9 @@ impl GpuBackend {
         work: &[PixelWork],
         at_once: u32,
     ) -> Result<RayCounts, GpuError> {
+        let begun = self.places.begin();
         lanes.upload(&self.gpu, work, &Gathered::of(film, work));
+        self.places.end(Place::Sums, begun);
 
         let longest = work.iter().map(PixelWork::samples).max().unwrap_or(0);
         let real_pass = pass == Pass::Real;
@@ -363,8 +379,8 @@ impl GpuBackend {
     /// Takes every sample of the batch to its end.
     fn run_batch(&mut self, lanes: &Lanes, batch: &Batch) -> Result<(), GpuError> {
         self.count_down_to_loss();
-        let queue = &self.gpu.queue;
-        queue.write_buffer(&lanes.batch, 0, bytemuck::bytes_of(batch));
+        let mut begun = self.places.begin();
+        self.gpu.write(&lanes.batch, 0, bytemuck::bytes_of(batch));
         lanes.clear_counters(&self.gpu);
 
         // The first queue is written with parity 1, so that parity 0 reads it.
@@ -392,9 +408,11 @@ impl GpuBackend {
             let start = Instant::now();
             let mut encoder = self.encode(lanes, &dispatches);
             lanes.copy_counters(&mut encoder);
-            self.submit(encoder)?;
+            self.gpu.submit(encoder, dispatches.len() as u64)?;
+            begun = self.places.end(Place::Record, begun);
             let counters = lanes.read_counters(&self.gpu)?;
             self.take_times()?;
+            begun = self.places.end(Place::Wait, begun);
             if self.warm {
                 let begun = if steps == 0 { batch.lane_count } else { 0 };
                 let done = u64::from(begun) + u64::from(counters.steps - steps_before);
@@ -432,19 +450,26 @@ impl GpuBackend {
         if self.features.sharing && batch.real_pass == 0 {
             dispatches.insert(0, once(SHARE, batch.lane_count));
         }
+        let begun = self.places.begin();
         let mut encoder = self.encode(lanes, &dispatches);
         lanes.copy_counters(&mut encoder);
+        if last {
+            lanes.copy_sums(&mut encoder, work.len());
+        }
+        self.gpu.submit(encoder, dispatches.len() as u64)?;
+        let begun = self.places.end(Place::Record, begun);
         if !last {
-            self.submit(encoder)?;
             let counters = lanes.read_counters(&self.gpu)?;
             self.take_times()?;
+            self.places.end(Place::Wait, begun);
             return Ok(counters);
         }
-        lanes.copy_sums(&mut encoder, work.len());
-        self.submit(encoder)?;
+        lanes.wait_for_sums(&self.gpu, work.len())?;
+        let begun = self.places.end(Place::Wait, begun);
         let (counters, gathered) = lanes.read_sums(&self.gpu, work.len())?;
         self.take_times()?;
         gathered.scatter(film, work);
+        self.places.end(Place::Sums, begun);
         Ok(counters)
     }
 
@@ -478,11 +503,6 @@ impl GpuBackend {
             }
         }
         encoder
-    }
-
-    fn submit(&self, encoder: wgpu::CommandEncoder) -> Result<(), GpuError> {
-        self.gpu.queue.submit([encoder.finish()]);
-        self.gpu.check()
     }
 
     fn take_times(&mut self) -> Result<(), GpuError> {

@@ -9,7 +9,7 @@ use crate::film::Film;
 use crate::gpu::Changed;
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Scene};
-use crate::work::{Meter, Phase, Watcher};
+use crate::work::{Meter, Phase, Place, Watcher};
 
 /// Share of the proxy's pixels above which a limited albedo is told.
 const MOSTLY: f64 = 0.5;
@@ -39,7 +39,9 @@ impl Renderer {
         let look_ahead = self.core.seconds.look_ahead;
         if real_light_changed {
             self.surfaces.clear();
+            let begun = self.core.places.begin();
             self.prepare_photo(watcher);
+            self.core.places.end(Place::Photo, begun);
         }
         let swept = self.prepare_shutter(watcher)?;
         self.keep_lens_grid();
@@ -49,7 +51,9 @@ impl Renderer {
             Changed::View if swept => Changed::Moving,
             changed => changed,
         };
+        let begun = core.places.begin();
         core.backend.update(&core.packed, changed)?;
+        core.places.end(Place::Upload, begun);
         core.seconds.build += stopwatch.secs() - (core.seconds.look_ahead - look_ahead);
         self.open_backend(watcher)
     }
@@ -161,9 +165,12 @@ impl Renderer {
         let core = &mut self.core;
         let without = core.options.without;
         without.apply_to_frame(&mut core.packed.frame);
+        let begun = core.places.begin();
         core.packed.set_backdrop(&core.scene);
+        let begun = core.places.end(Place::Backdrop, begun);
         cpu::pilot(&mut core.packed, core.lens_grid.as_ref(), &meter);
         without.apply_to_pixels(&mut core.packed.pixels);
+        let begun = core.places.end(Place::Pilot, begun);
         let photons = core.packed.photons_per_ray > 0;
         let note = core.packed.black_shadows(photons);
         core.notes
@@ -172,6 +179,7 @@ impl Renderer {
             true => None,
             false => cpu::backdrop_share(&mut core.packed),
         };
+        let begun = core.places.end(Place::Backdrop, begun);
         core.film = Film::new(
             core.film.width,
             core.film.height,
@@ -183,6 +191,7 @@ impl Renderer {
         let grouped = core.options.keeps_groups(core.scene.settings.combine);
         core.film.set_groups(grouped);
         core.film.set_photons(core.packed.photons_per_ray > 0);
+        core.places.end(Place::Film, begun);
         match (core.options.filter, core.options.draft) {
             (None, _) => {}
             (Some(_), false) => self.surfaces = cpu::diffuse_surfaces(&core.packed),

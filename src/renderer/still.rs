@@ -32,5 +32,6 @@ pub(super) fn advance(
 /// Short beside the main passes, and without it edge pixels would not be Eq. 4: not cancelled.
 pub(super) fn replay_real(core: &mut Core) -> Result<(), RenderError> {
     let end = core.scene.settings.rays_per_pixel;
-    core.take(&core.real_work(|_| end), &Watcher::none())
+    let work = core.real_work(|_| end);
+    core.take(&work, &Watcher::none())
 }
