@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::kernel::{BindGroups, Kernel};
-use super::lanes::{Batch, Beside, Counters, Gathered, Lanes, most_lanes, state_parts};
+use super::lanes::{Batch, Beside, Counters, Lanes, most_lanes, state_parts};
 use super::pacer::Pacer;
 use super::photons::Photons;
 use super::profile::{
@@ -241,10 +241,11 @@ impl GpuBackend {
         let begun = self.places.begin();
         // Pixels that share a batch take equally many samples of it: no lanes stay empty. Those of a sharing tile lie together.
         let mut pixels = work.pixels.clone();
-        let tile = |work: &PixelWork| tile_of(film.width, work.pixel);
-        pixels.sort_by_key(|work| (Reverse(work.samples()), tile(work), work.pixel));
-        for members in pixels.chunk_by_mut(|a, b| a.samples() == b.samples() && tile(a) == tile(b))
-        {
+        for work in &mut pixels {
+            work.tile = tile_of(film.width, work.pixel);
+        }
+        pixels.sort_unstable_by_key(|work| (Reverse(work.samples()), work.tile, work.pixel));
+        for members in pixels.chunk_by_mut(|a, b| a.samples() == b.samples() && a.tile == b.tile) {
             let count = members.len() as u32;
             for (place, work) in (0..).zip(members) {
                 work.tile = place + TILE_PLACES * count;
@@ -296,7 +297,8 @@ impl GpuBackend {
         if present >= wanted {
             return Ok(wanted);
         }
-        match Lanes::new(&self.gpu, wanted, &self.state_parts, beside) {
+        let room = self.pacer.room(wanted);
+        match Lanes::new(&self.gpu, room, &self.state_parts, beside) {
             Ok(lanes) => {
                 self.bind(&lanes)?;
                 self.lanes = Some(lanes);
@@ -348,7 +350,15 @@ impl GpuBackend {
         at_once: u32,
     ) -> Result<RayCounts, GpuError> {
         let begun = self.places.begin();
-        lanes.upload(&self.gpu, work, &Gathered::of(film, work));
+        lanes.upload_work(&self.gpu, work);
+        let begun = self.places.end(Place::List, begun);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let is_empty = |work: &PixelWork| film.pixels[work.pixel as usize].is_empty();
+        if work.iter().all(is_empty) {
+            lanes.clear_sums(&mut encoder, work.len());
+        } else {
+            lanes.upload_sums(&self.gpu, film, work);
+        }
         self.places.end(Place::Sums, begun);
 
         let longest = work.iter().map(PixelWork::samples).max().unwrap_or(0);
@@ -367,21 +377,27 @@ impl GpuBackend {
                 with_groups: u32::from(lanes.beside.groups && !real_pass),
                 ..Batch::default()
             };
-            self.run_batch(lanes, &batch)?;
+            self.run_batch(lanes, &batch, encoder)?;
+            encoder = self.gpu.device.create_command_encoder(&Default::default());
             sample_offset += sample_count;
-            let counters =
-                self.finish_batch(lanes, &batch, film, work, sample_offset == longest)?;
+            let last = sample_offset == longest;
+            let counters = self.finish_batch(lanes, &batch, film, work, last)?;
             rays += counters.rays;
         }
         Ok(rays)
     }
 
-    /// Takes every sample of the batch to its end.
-    fn run_batch(&mut self, lanes: &Lanes, batch: &Batch) -> Result<(), GpuError> {
+    /// Takes every sample of the batch to its end; `encoder` has what comes before.
+    fn run_batch(
+        &mut self,
+        lanes: &Lanes,
+        batch: &Batch,
+        mut encoder: wgpu::CommandEncoder,
+    ) -> Result<(), GpuError> {
         self.count_down_to_loss();
         let mut begun = self.places.begin();
         self.gpu.write(&lanes.batch, 0, bytemuck::bytes_of(batch));
-        lanes.clear_counters(&self.gpu);
+        lanes.clear_counters(&mut encoder);
 
         // The first queue is written with parity 1, so that parity 0 reads it.
         let mut parity = 0;
@@ -406,7 +422,7 @@ impl GpuBackend {
                 parity = 1 - parity;
             }
             let start = Instant::now();
-            let mut encoder = self.encode(lanes, &dispatches);
+            self.encode(&mut encoder, lanes, &dispatches);
             lanes.copy_counters(&mut encoder);
             self.gpu.submit(encoder, dispatches.len() as u64)?;
             begun = self.places.end(Place::Record, begun);
@@ -429,6 +445,7 @@ impl GpuBackend {
                 return Err(GpuError::Endless(steps));
             }
             dispatches.clear();
+            encoder = self.gpu.device.create_command_encoder(&Default::default());
         }
     }
 
@@ -451,7 +468,8 @@ impl GpuBackend {
             dispatches.insert(0, once(SHARE, batch.lane_count));
         }
         let begun = self.places.begin();
-        let mut encoder = self.encode(lanes, &dispatches);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        self.encode(&mut encoder, lanes, &dispatches);
         lanes.copy_counters(&mut encoder);
         if last {
             lanes.copy_sums(&mut encoder, work.len());
@@ -466,15 +484,18 @@ impl GpuBackend {
         }
         lanes.wait_for_sums(&self.gpu, work.len())?;
         let begun = self.places.end(Place::Wait, begun);
-        let (counters, gathered) = lanes.read_sums(&self.gpu, work.len())?;
+        let counters = lanes.read_sums(&self.gpu, film, work)?;
         self.take_times()?;
-        gathered.scatter(film, work);
         self.places.end(Place::Sums, begun);
         Ok(counters)
     }
 
-    fn encode(&mut self, lanes: &Lanes, dispatches: &[Dispatch]) -> wgpu::CommandEncoder {
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+    fn encode(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        lanes: &Lanes,
+        dispatches: &[Dispatch],
+    ) {
         let kernels = &self.kernels;
         let groups = &self.groups;
         let run = |pass: &mut wgpu::ComputePass<'_>, dispatch: &Dispatch| {
@@ -499,10 +520,9 @@ impl GpuBackend {
                     });
                     run(&mut pass, dispatch);
                 }
-                profiler.resolve(&mut encoder);
+                profiler.resolve(encoder);
             }
         }
-        encoder
     }
 
     fn take_times(&mut self) -> Result<(), GpuError> {

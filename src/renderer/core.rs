@@ -38,6 +38,8 @@ pub(super) struct Core {
     pub backdrop_share: Option<f64>,
     /// The picture's time.
     pub time_secs: f64,
+    /// What a ray in every pixel took the last time.
+    pub secs_per_ray: Option<f64>,
 }
 
 impl Core {

@@ -234,6 +234,7 @@ impl Renderer {
                 notes: Vec::new(),
                 photo_light: None,
                 backdrop_share: None,
+                secs_per_ray: None,
             },
             driver: Driver::Still,
             end_sample,

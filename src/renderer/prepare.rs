@@ -5,7 +5,6 @@ use super::core::Core;
 use super::stopwatch::Stopwatch;
 use super::{RenderError, Renderer, photo_albedo};
 use crate::cpu::{self, LensGrid};
-use crate::film::Film;
 use crate::gpu::Changed;
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Scene};
@@ -48,7 +47,7 @@ impl Renderer {
         self.look_ahead(watcher);
         let core = &mut self.core;
         let changed = match changed {
-            Changed::View if swept => Changed::Moving,
+            changed if swept => changed.max(Changed::Moving),
             changed => changed,
         };
         let begun = core.places.begin();
@@ -180,12 +179,10 @@ impl Renderer {
             false => cpu::backdrop_share(&mut core.packed),
         };
         let begun = core.places.end(Place::Backdrop, begun);
-        core.film = Film::new(
-            core.film.width,
-            core.film.height,
-            core.film.first_sample,
-            core.options.guides,
-        );
+        // Of a film that no ray was traced for, memory is not committed.
+        if core.rays.traced() > 0 {
+            core.film.renew();
+        }
         let factors = core.packed.pixels.iter().map(|p| p.sample_factor);
         core.film.set_sample_factors(factors);
         let grouped = core.options.keeps_groups(core.scene.settings.combine);
