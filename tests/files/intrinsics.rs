@@ -193,7 +193,6 @@ fn cv_ros_fisheye_wide() {
     folder.refuse(command, "unified");
 }
 
-/// The model of the distortion says more than that of the camera.
 #[test]
 fn distortion_by_other_names() {
     let folder = folder();
@@ -234,6 +233,7 @@ fn distortion_by_other_names() {
     }
 }
 
+/// The model of the distortion says more than that of the camera.
 #[test]
 fn pinholes_with_the_distortion_of_a_fisheye() {
     let folder = wide_folder();
