@@ -137,6 +137,12 @@ impl Film {
         }
     }
 
+    /// No sample has reached the pixel.
+    pub fn is_untouched(&self, pixel: usize) -> bool {
+        let sums = &self.pixels[pixel];
+        sums.n == 0 && sums.n_real == 0 && sums.non_finite == 0
+    }
+
     /// Takes all samples back for another plan of samples, in the memory that is there; [`Film::set_groups`] and [`Film::set_photons`] follow.
     pub fn renew(&mut self) {
         self.pixels.fill(PixelSums::default());

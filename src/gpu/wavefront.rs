@@ -353,8 +353,8 @@ impl GpuBackend {
         lanes.upload_work(&self.gpu, work);
         let begun = self.places.end(Place::List, begun);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let is_empty = |work: &PixelWork| film.pixels[work.pixel as usize].is_empty();
-        if work.iter().all(is_empty) {
+        let is_untouched = |work: &PixelWork| film.is_untouched(work.pixel as usize);
+        if work.iter().all(is_untouched) {
             lanes.clear_sums(&mut encoder, work.len());
         } else {
             lanes.upload_sums(&self.gpu, film, work);
