@@ -1,5 +1,7 @@
 //! The layers of EXR files put together again by another program.
 
+mod mattes;
+
 use std::process::Command;
 
 use crate::support::{Folder, root};
