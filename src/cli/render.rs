@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::check::noted_focal_px;
 use super::picture_flags::PictureFlags;
 use super::progress::{Bar, SCRAMBLES};
 use super::values::part;
@@ -88,8 +89,8 @@ impl Arguments {
             let message = "--resume wants one output, the part's .exr (-o part.exr): pictures come from `mixray merge`";
             return Err(Failure(message.to_owned()));
         }
-        let goal = self.flags.goal.goal(self.flags.rpp)?;
         refuse_motion(&self.layers)?;
+        let goal = self.flags.goal.goal(self.flags.rpp)?;
         Ok(Job {
             goal,
             layers: self.layers,
@@ -165,6 +166,8 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         bar.aside(|| say_idle(saving, reason));
     }
     let mut findings = check::scene(renderer.scene(), Extent::Still);
+    let noted_px = noted_focal_px(renderer.scene());
+    findings.extend(check::focal_length(renderer.scene(), noted_px));
     let fitted_ev = renderer.roughly_fitted_exposure_ev();
     findings.extend(check::exposure(renderer.scene(), fitted_ev));
     bar.aside(|| {
@@ -193,13 +196,13 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     }
 
     let start = Instant::now();
-    let moved = write(
-        &mut renderer,
-        &targets,
     let film_range = job.range.map(|_| {
         let first = renderer.film().first_sample;
         (first, first + renderer.samples())
     });
+    let moved = write(
+        &mut renderer,
+        &targets,
         &layers,
         job.flags.png_bits,
         job.frame,
@@ -253,15 +256,15 @@ pub(super) fn write(
     film_range: Option<(u32, u32)>,
 ) -> Result<Option<f64>, Failure> {
     let gpu = renderer.gpu_device().cloned().map(GpuStages::new);
-    let Delivered {
-        picture,
-        film: shown,
     let is_exr = targets.iter().any(|t| t.format() == Format::Exr);
     let mattes = match is_exr && layers.need_mattes() {
         true => Some(renderer.mattes()?),
         false => None,
     };
     let renderer = &*renderer;
+    let Delivered {
+        picture,
+        film: shown,
         moved,
     } = renderer.delivered();
     let finish = match is_exr && layers.need_stages() {
@@ -315,9 +318,6 @@ pub(super) fn write(
     Ok(moved)
 }
 
-/// Says that a saving was switched off in vain.
-pub(super) fn say_idle(saving: &str, reason: &str) {
-    say(
 /// A still has no frames before and after.
 pub(super) fn refuse_motion(layers: &[ExrLayer]) -> Result<(), Failure> {
     if layers.contains(&ExrLayer::Motion) {
@@ -327,6 +327,9 @@ pub(super) fn refuse_motion(layers: &[ExrLayer]) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Says that a saving was switched off in vain.
+pub(super) fn say_idle(saving: &str, reason: &str) {
+    say(
         "note",
         &format!("--no-skip {saving} changes nothing here: {reason}"),
     );
