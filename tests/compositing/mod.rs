@@ -104,6 +104,27 @@ fn layers_are_put_together_to_the_picture() {
     }
 }
 
+/// Sharpness filters what the layers were put together to, and is a layer itself.
+#[test]
+fn layers_are_put_together_to_the_sharpened_picture() {
+    if !has_openexr() {
+        return;
+    }
+    let folder = folder();
+    let sharp =
+        "[sharpness]\nsigma_px = [1.0, 0.9, 1.1]\nsharpening = 0.6\nsharpening_radius_px = 1.2\n";
+    folder.write("scene.toml", format!("{SCENE}{sharp}"));
+    for composite in ["additive", "quotient"] {
+        folder.succeed(&format!(
+            "render scene.toml --composite {composite} -o {composite}.exr -o {composite}.png"
+        ));
+        let (is_same, said) = recompose(&folder, composite, &[]);
+        assert!(is_same, "{composite}: {said}");
+        let (is_same, said) = recompose(&folder, composite, &["--without", "sharpness"]);
+        assert!(!is_same, "control: {said}");
+    }
+}
+
 /// What the header says: all that the picture depends on, and nothing that equal renders do not share.
 #[test]
 fn metadata_tells_settings_and_no_circumstances() {
