@@ -13,6 +13,9 @@ use super::exr_text::text_value;
 use super::{ExrPicture, Metadata, OutputError, Target, write_bytes};
 use crate::renderer::MotionVectors;
 
+/// Of motion vectors, to a pixel.
+const VECTOR_STEPS: f32 = 1024.0;
+
 /// ITU-R BT.709 primaries and D65.
 fn rec709() -> Chromaticities {
     Chromaticities {
@@ -89,7 +92,9 @@ pub(super) fn write_layers<'a>(
     if let Some(MotionVectors { forward, backward }) = motion {
         for (layer, vectors) in [("forward", forward), ("backward", backward)] {
             for (axis, name) in ["u", "v"].into_iter().enumerate() {
-                let values: Vec<f32> = vectors.iter().map(|vector| vector[axis]).collect();
+                let rounded =
+                    |vector: &[f32; 2]| (vector[axis] * VECTOR_STEPS).round() / VECTOR_STEPS;
+                let values: Vec<f32> = vectors.iter().map(rounded).collect();
                 push_channel(&mut channels, &format!("{layer}.{name}"), values);
             }
         }
