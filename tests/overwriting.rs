@@ -37,6 +37,8 @@ const POSES: &str = r#"{ "format": "mixray-trajectory", "version": 1, "frames_pe
 { "frame": 1, "world_from_camera": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]] }] }"#;
 const CALIBRATION: &str = "%YAML:1.0\nimage_width: 24\nimage_height: 16\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 20., 0., 11.5, 0., 20., 7.5, 0., 0., 1. ]\n";
 
+const BOARD: &str = "[chessboard]\ncolumns = 6\nrows = 4\nsquare_m = 0.03\n";
+
 struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -60,6 +62,9 @@ impl Folder {
             });
             picture.save(folder.path(name)).unwrap();
         }
+        let wall = |x: u32, y: u32| [100 + ((x * 7919 + y * y * 104_729) % 31 % 5) as u8; 3];
+        let wall = image::RgbImage::from_fn(160, 120, |x, y| image::Rgb(wall(x, y)));
+        wall.save(folder.path("wall.png")).unwrap();
         exr::prelude::write_rgb_file(folder.path("env.exr"), 4, 2, |_, _| (1.0f32, 1.0, 1.0))
             .unwrap();
         let corners = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
@@ -74,6 +79,7 @@ impl Folder {
         folder.write("scene.toml", SCENE);
         folder.write("poses.json", POSES);
         folder.write("calibration.yaml", CALIBRATION);
+        folder.write("board.toml", BOARD);
         let mut film = b"YUV4MPEG2 W24 H16 F10:1 Ip A1:1 C420jpeg\n".to_vec();
         for frame in 0..2 {
             film.extend(b"FRAME\n");
@@ -276,6 +282,46 @@ const CASES: &[Case] = &[
         line: "motion-blur photo.png layer.png mask.png --vector 9,0 -o @",
         free: "new.exr",
         inputs: OF_LAYERS,
+    },
+    Case {
+        line: "export-blender scene.toml -o @",
+        free: "new.py",
+        inputs: OF_SCENE,
+    },
+    Case {
+        line: "bundle scene.toml -o @",
+        free: "new.zip",
+        inputs: OF_SCENE,
+    },
+    Case {
+        line: "noise estimate wall.png -o @",
+        free: "new.toml",
+        inputs: &["wall.png"],
+    },
+    Case {
+        line: "track --print-board board.toml -o @",
+        free: "new.pdf",
+        inputs: &["board.toml"],
+    },
+    Case {
+        line: "live scene.toml --board board.toml --input film.y4m --intrinsics calibration.yaml --overwrite -o @",
+        free: "new.y4m",
+        inputs: &[
+            "scene.toml",
+            "photo.png",
+            "env.exr",
+            "model.bin",
+            "texture.png",
+            "noise.toml",
+            "board.toml",
+            "calibration.yaml",
+            "film.y4m",
+        ],
+    },
+    Case {
+        line: "live scene.toml --board board.toml --input film.y4m -o other.y4m --stats @",
+        free: "new.json",
+        inputs: &["board.toml", "film.y4m"],
     },
     Case {
         line: "cartoon photo.png @",

@@ -85,8 +85,11 @@ def blocks(image):
 
 
 def converge(reference, arguments):
+    if arguments.virtual:
+        reference.known &= reference.mask[..., 0] > 0.999
+        reference.composite = reference.composite * reference.known[..., None]
     images, _ = mixray_composites(
-        reference, arguments.runs, rays_per_pixel=arguments.rays_per_pixel, backend=arguments.backend
+        reference, arguments.runs, rays_per_pixel=arguments.rays_per_pixel, backend=arguments.backend, combine=arguments.combine
     )
     error = (images.mean(0) - reference.composite) * reference.known[..., None]
     scale = reference.composite.mean()
@@ -153,6 +156,8 @@ def main():
     parser.add_argument("--rays-per-pixel", type=int, default=49)
     parser.add_argument("--runs", type=int, default=4)
     parser.add_argument("--backend", default="cpu")
+    parser.add_argument("--combine", default="robust", help="as mixray render takes it; mean has no bias")
+    parser.add_argument("--virtual", action="store_true", help="only pixels that virtual objects cover wholly")
     parser.add_argument("--images")
     parser.add_argument("--gain", type=float, default=20.0)
     parser.add_argument("--write", action="store_true")

@@ -59,7 +59,7 @@ def write_scene(peer, folder):
     return path
 
 
-def render(scene_path, *, rays_per_pixel, seed, estimator="direct", sampler="sobol", backend="cpu", picture="out.exr"):
+def render(scene_path, *, rays_per_pixel, seed, estimator="direct", sampler="sobol", backend="cpu", combine="robust", picture="out.exr"):
     """(layers of the EXR by channel name, statistics). A PNG has no layers and spares the real radiance that they need."""
     image, stats = scene_path.with_name(picture), scene_path.with_name("stats.json")
     arguments = {
@@ -68,6 +68,7 @@ def render(scene_path, *, rays_per_pixel, seed, estimator="direct", sampler="sob
         "--estimator": estimator,
         "--sampler": sampler,
         "--backend": backend,
+        "--combine": combine,
         "--stats": stats,
         "-o": image,
     }

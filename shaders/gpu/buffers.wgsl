@@ -19,3 +19,9 @@ import package::packed::records::{Frame, Light, PixelInfo, TextureRef, Triangle,
 @group(0) @binding(13) var<storage, read> pixels: array<PixelInfo>;
 @group(0) @binding(14) var<storage, read> bvh_nodes: array<vec4<u32>>;
 @group(0) @binding(15) var<storage, read> bvh_leaves: array<vec4<f32>>;
+
+// Told by the radius, which the last place has not: some drivers compile a kernel anew before each dispatch where a uniform bounds a loop (Mesa's
+// lavapipe), and a constant bound would unroll it.
+fn has_photon_sphere(i: u32) -> bool {
+    return frame.photon_spheres[i].w > 0.0;
+}

@@ -1,11 +1,11 @@
 // Where light comes from by way of smooth virtual objects, learnt from photons. Rust twin: src/light/guide.rs.
 
-import package::gpu::buffers::{frame, guide};
+import package::gpu::buffers::{frame, guide, has_photon_sphere};
 import package::math::{INV_PI, dot3, hash_combine, length3, orthonormal_basis, safe_sqrt, sincos_2pi};
 
 fn guide_place(position: vec3<f32>) -> vec4<u32> {
     var nearest = FARTHEST;
-    for (var i = 0u; i < frame.photon_sphere_count; i++) {
+    for (var i = 0u; has_photon_sphere(i); i++) {
         let apart = position - frame.photon_spheres[i].xyz;
         nearest = min(nearest, dot3(apart, apart));
     }

@@ -96,6 +96,8 @@ fn checked_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
 
 const PROFILE: &str = "its colour profile is not understood: it is read as sRGB";
 
+const HDR: &str = "its codes are of PQ or HLG (HDR), which is not understood: it is read as sRGB, of which neither light nor colours are right; convert it to OpenEXR";
+
 /// `cicp` wins over an ICC profile; of what `is_cut` off, the rows before are kept.
 fn read_codes(
     bytes: &[u8],
@@ -120,6 +122,7 @@ fn read_codes(
     match profile {
         Some(Ok(profile)) => tags.profile = Some(Arc::new(profile)),
         Some(Err(Unused::NotUnderstood)) => warnings.push(PROFILE.to_owned()),
+        Some(Err(Unused::IsHdr)) => warnings.push(HDR.to_owned()),
         Some(Err(Unused::IsSrgb)) | None => {}
     }
     tags.orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);

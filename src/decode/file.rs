@@ -56,8 +56,16 @@ pub(crate) fn read_stream(stream: impl Read, limit: u64) -> Result<Vec<u8>, Stri
 /// # Errors
 /// The reason, without the path.
 pub(crate) fn read_text(path: &Path, limit: u64) -> Result<String, String> {
-    let bytes = read_file(path, limit)?;
-    String::from_utf8(bytes).map_err(|_| "it is no UTF-8 text".to_owned())
+    text_of(read_file(path, limit)?).ok_or_else(|| "it is no UTF-8 text".to_owned())
+}
+
+/// UTF-8 without the mark that editors of Windows begin it with.
+pub(crate) fn text_of(bytes: Vec<u8>) -> Option<String> {
+    let text = String::from_utf8(bytes).ok()?;
+    Some(match text.strip_prefix('\u{feff}') {
+        Some(rest) => rest.to_owned(),
+        None => text,
+    })
 }
 
 fn too_long(length: u64, limit: u64) -> String {

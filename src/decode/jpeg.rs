@@ -44,10 +44,29 @@ pub(super) fn outline(bytes: &[u8], from: usize) -> Outline {
         }
         // Segments may hold anything, a small picture too: their length tells how far to jump.
         if let (0xc0..=0xcf | 0xda..=0xfe, Some(&[high, low])) = (code, bytes.get(at..at + 2)) {
-            at += usize::from(u16::from_be_bytes([high, low]));
+            let end = at + usize::from(u16::from_be_bytes([high, low]));
+            if let Some(next) = start_in_segment(bytes, code, at..end) {
+                outline.next = Some(next);
+                break;
+            }
+            at = end;
         }
     }
     outline
+}
+
+/// Where the next picture begins in what should be a segment, but is cut off.
+fn start_in_segment(bytes: &[u8], code: u8, range: Range<usize>) -> Option<usize> {
+    let may_hold_pictures = matches!(code, 0xe0..=0xef | 0xfe);
+    // Behind a segment stands a marker, but for a scan's codes.
+    let is_whole = code == SCAN || bytes.get(range.end) == Some(&0xff);
+    if may_hold_pictures && is_whole {
+        return None;
+    }
+    let held = bytes.get(range.start..)?;
+    let held = &held[..held.len().min(range.len())];
+    let start = held.windows(3).position(|w| w == [0xff, START, 0xff])?;
+    Some(range.start + start)
 }
 
 /// The next ff with something other than a stuffed zero or a fill byte after it.
@@ -166,6 +185,10 @@ mod tests {
         let cut = [&PICTURE[..n - 2], PICTURE, &[0, 0], PICTURE].concat();
         let (a, b) = (n - 2, 2 * n - 2);
         assert_eq!(split_jpegs(&cut), [0..a, a..b, b + 2..b + 2 + n]);
+        let in_tables = [&[0xff, 0xd8, 0xff, 0xdb, 0, 67, 1][..], PICTURE, PICTURE].concat();
+        assert_eq!(split_jpegs(&in_tables), [0..7, 7..7 + n, 7 + n..7 + 2 * n]);
+        let in_a_note = [&[0xff, 0xd8, 0xff, 0xe0, 0, 16, 1][..], PICTURE].concat();
+        assert_eq!(split_jpegs(&in_a_note), [0..7, 7..7 + n]);
         assert_eq!(
             split_jpegs(&PICTURE[..n - 1]),
             std::slice::from_ref(&(0..n - 1)),

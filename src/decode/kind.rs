@@ -122,9 +122,11 @@ fn of_ending(ending: &str) -> Option<FileKind> {
 /// Of files of other programs that hold films.
 pub(crate) fn film_kind(begin: &[u8]) -> Option<&'static str> {
     match begin {
-        [_, _, _, _, b'f', b't', b'y', b'p', ..] | [_, _, _, _, b'm', b'o', b'o', b'v', ..] => {
-            Some("an MP4 or QuickTime film")
-        }
+        [_, _, _, _, b'f', b't', b'y', b'p', ..]
+        | [_, _, _, _, b'm', b'o', b'o', b'v', ..]
+        | [_, _, _, _, b'm', b'd', b'a', b't', ..]
+        | [_, _, _, _, b'w', b'i', b'd', b'e', ..] => Some("an MP4 or QuickTime film"),
+        [0x30, 0x26, 0xb2, 0x75, ..] => Some("a Windows Media film"),
         [0x1a, 0x45, 0xdf, 0xa3, ..] => Some("a Matroska or WebM film"),
         [b'R', b'I', b'F', b'F', _, _, _, _, b'A', b'V', b'I', ..] => Some("an AVI film"),
         [b'O', b'g', b'g', b'S', ..] => Some("an Ogg film"),

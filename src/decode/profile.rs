@@ -31,6 +31,8 @@ pub struct ColourProfile {
 pub(super) enum Unused {
     /// Its colours are sRGB's.
     IsSrgb,
+    /// PQ or HLG.
+    IsHdr,
     NotUnderstood,
 }
 
@@ -56,7 +58,10 @@ impl ColourProfile {
             transfer,
             TransferCharacteristics::Smpte2084 | TransferCharacteristics::Hlg
         );
-        if is_hdr || matrix != 0 || range != 1 {
+        if is_hdr {
+            return Err(Unused::IsHdr);
+        }
+        if matrix != 0 || range != 1 {
             return Err(Unused::NotUnderstood);
         }
         let profile = ColorProfile::new_from_cicp(CicpProfile {
@@ -239,7 +244,10 @@ mod tests {
         assert!(apart(&again, 10099) > 5e-5, "control");
         let p3 = ColourProfile::of_cicp([12, 13, 0, 1]).unwrap();
         assert!(p3.linear([51400, 10280, 10280])[1] < 0.0);
-        for refused in [[12, 16, 0, 1], [1, 13, 1, 1], [1, 13, 0, 0], [99, 13, 0, 1]] {
+        for hdr in [[12, 16, 0, 1], [9, 18, 0, 1]] {
+            assert_eq!(ColourProfile::of_cicp(hdr).unwrap_err(), Unused::IsHdr);
+        }
+        for refused in [[1, 13, 1, 1], [1, 13, 0, 0], [99, 13, 0, 1]] {
             assert_eq!(
                 ColourProfile::of_cicp(refused).unwrap_err(),
                 Unused::NotUnderstood

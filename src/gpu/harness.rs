@@ -18,26 +18,52 @@
 //! assert!(inputs.iter().zip(&outputs).all(|(i, o)| 2 * i == *o));
 //! ```
 
-use std::sync::{Arc, OnceLock};
+use std::cell::OnceCell;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::{AdapterChoice, Composer, Features, GpuDevice, GpuError, SceneBuffers, kernel::Kernel};
 use crate::shared::WORKGROUP;
 
-/// The device that tests share, software or not; None, said aloud, where there is none.
+/// Devices that no test uses at the moment.
+static IDLE: Mutex<Vec<&'static Arc<GpuDevice>>> = Mutex::new(Vec::new());
+
+/// A device while one test has it.
+struct Lease(&'static Arc<GpuDevice>);
+
+impl Drop for Lease {
+    fn drop(&mut self) {
+        let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
+        idle.push(self.0);
+    }
+}
+
+/// A device for this thread alone, software or not; None, said aloud, where there is none. Threads that come later have it after this one.
+///
+/// One queue takes one submission after the other, and a software device compiles kernels in them: two tests would wait for each other.
 ///
 /// # Panics
 /// With `MIXRAY_REQUIRE_GPU=1` in the environment and no device: there, a skipped test is a failed one.
 pub fn test_device() -> Option<&'static Arc<GpuDevice>> {
-    static DEVICE: OnceLock<Result<Arc<GpuDevice>, GpuError>> = OnceLock::new();
-    match DEVICE.get_or_init(|| GpuDevice::open(AdapterChoice::Any).map(Arc::new)) {
-        Ok(gpu) => Some(gpu),
+    thread_local! {
+        static OWN: OnceCell<Result<Lease, GpuError>> = const { OnceCell::new() };
+    }
+    let lease = || {
+        let idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let gpu = match idle {
+            Some(gpu) => gpu,
+            None => Box::leak(Box::new(Arc::new(GpuDevice::open(AdapterChoice::Any)?))),
+        };
+        Ok(Lease(gpu))
+    };
+    OWN.with(|own| match own.get_or_init(lease) {
+        Ok(Lease(gpu)) => Some(*gpu),
         Err(error) => {
             let required = std::env::var("MIXRAY_REQUIRE_GPU").is_ok_and(|value| value == "1");
             assert!(!required, "MIXRAY_REQUIRE_GPU=1, but {error}");
             eprintln!("skipped, GPU code is not tested here: {error}");
             None
         }
-    }
+    })
 }
 
 /// A piece of WGSL that turns `input_words` words into `output_words` words, once for each record of the input.

@@ -62,6 +62,8 @@ pub struct Photons {
     staging: wgpu::Buffer,
     /// Photons that the next submission may have.
     next_batch: u32,
+    /// The first submission compiles the kernel, and says nothing about speed.
+    warm: bool,
 }
 
 impl Photons {
@@ -110,6 +112,7 @@ impl Photons {
             splats,
             staging,
             next_batch: FIRST_BATCH,
+            warm: false,
         })
     }
 
@@ -157,7 +160,10 @@ impl Photons {
             first += count;
             let secs = begin.elapsed().as_secs_f64();
             let room = u64::from(LARGEST_BATCH) * count / u64::from(2 * listed.max(1));
-            let affordable = (count as f64 * TARGET_SECS / secs.max(1e-6)) as u64;
+            let affordable = match std::mem::replace(&mut self.warm, true) {
+                true => (count as f64 * TARGET_SECS / secs.max(1e-6)) as u64,
+                false => count,
+            };
             let most = room.min(affordable).min(4 * u64::from(self.next_batch));
             self.next_batch = most.clamp(u64::from(WORKGROUP), u64::from(LARGEST_BATCH)) as u32;
         }

@@ -45,6 +45,7 @@ pub fn run_live(
     let begin = Instant::now();
     let mut live = Live {
         options,
+        output: output_of(options)?,
         known,
         intrinsics,
         begin,
@@ -53,10 +54,14 @@ pub fn run_live(
         budget: RayBudget::new(options.frame_secs, 1),
         tally: Tally::default(),
         started: None,
-        sink: open_sink(options, &intake)?,
+        sink: None,
         intake,
         hear,
     };
+    // Who reads standard output need not wait for the first frame.
+    if live.output == FrameOutput::Stdout {
+        live.sink()?;
+    }
     let mut window_began = begin;
     let end = loop {
         if watcher.is_cancelled() {
@@ -77,7 +82,7 @@ pub fn run_live(
     Ok(stats)
 }
 
-fn open_sink(options: &LiveOptions, intake: &Intake) -> Result<FrameSink, LiveError> {
+fn output_of(options: &LiveOptions) -> Result<FrameOutput, LiveError> {
     let is_film = options.output.extension().is_some_and(|e| e == "y4m");
     if !is_film && options.output.as_os_str() != "-" {
         return Err(LiveError::Unfit(format!(
@@ -85,13 +90,21 @@ fn open_sink(options: &LiveOptions, intake: &Intake) -> Result<FrameSink, LiveEr
             options.output.display()
         )));
     }
+    Ok(FrameOutput::of(&options.output, None)?)
+}
+
+fn open_sink(
+    options: &LiveOptions,
+    output: FrameOutput,
+    intake: &Intake,
+) -> Result<FrameSink, LiveError> {
     // No other run's frames are these.
     let mut hash = ContentHash::default();
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     format!("{now:?}").add_to(&mut hash);
     Ok(FrameSink::open(SinkPlan {
         path: &options.output,
-        output: FrameOutput::of(&options.output, None)?,
+        output,
         layers: ExrLayers::new(&[], Composite::Additive),
         objects: Vec::new(),
         composite: Composite::Additive,
@@ -105,13 +118,15 @@ fn open_sink(options: &LiveOptions, intake: &Intake) -> Result<FrameSink, LiveEr
 
 struct Live<'a> {
     options: &'a LiveOptions,
+    output: FrameOutput,
     known: KnownBoard,
     intrinsics: Option<Intrinsics>,
     begin: Instant,
     /// Frames a second of the stream.
     rate: Option<f64>,
     intake: Intake,
-    sink: FrameSink,
+    /// A film waits for the scene, which tells what is an input.
+    sink: Option<FrameSink>,
     held: HeldPose,
     budget: RayBudget,
     tally: Tally,
@@ -145,6 +160,14 @@ struct Running {
 }
 
 impl Live<'_> {
+    fn sink(&mut self) -> Result<&mut FrameSink, LiveError> {
+        let sink = match self.sink.take() {
+            Some(sink) => sink,
+            None => open_sink(self.options, self.output.clone(), &self.intake)?,
+        };
+        Ok(self.sink.insert(sink))
+    }
+
     fn take(&mut self, arrived: Arrived) -> Result<(), LiveError> {
         let Arrived { number, planes, at } = arrived;
         let name = FrameName::of_stream(number, "the stream");
@@ -167,7 +190,7 @@ impl Live<'_> {
         if self.options.keep_time {
             let last = started.number.map_or(number, |last| last + 1);
             for _ in last..number {
-                self.sink.stand_in(&name)?;
+                self.sink()?.stand_in(&name)?;
             }
         }
         started.number = Some(number);
@@ -179,7 +202,7 @@ impl Live<'_> {
         let became = match placed.world_from_camera() {
             None => {
                 started.before = None;
-                self.sink.pass(&name, &frame)?;
+                self.sink()?.pass(&name, &frame)?;
                 Became::PassedThrough
             }
             Some(world_from_camera) => {
@@ -193,7 +216,7 @@ impl Live<'_> {
                     &mut seconds,
                 )?;
                 clock.lap();
-                self.sink.write(&name, &picture, &frame)?;
+                self.sink()?.write(&name, &picture, &frame)?;
                 seconds.write = clock.lap();
                 // The first frame also waited for the scene's trees.
                 if !is_first {
@@ -219,6 +242,7 @@ impl Live<'_> {
             sandbox: options.sandbox,
         };
         let mut scene = load_with(&options.scene, given)?;
+        self.sink()?;
         scene.settings.apply(&options.overrides);
         for warning in &scene.warnings {
             (self.hear)(&LiveEvent::Warning(warning));
@@ -340,7 +364,9 @@ impl Live<'_> {
     }
 
     fn end(self) -> Result<LiveStats, LiveError> {
-        self.sink.finish()?;
+        if let Some(sink) = self.sink {
+            sink.finish()?;
+        }
         let running = self.started.and_then(|started| started.running);
         let renderer = running.map(|running| running.renderer);
         Ok(LiveStats {

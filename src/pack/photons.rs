@@ -52,12 +52,13 @@ impl PackedScene {
     /// Fills the frame's spheres about smooth virtual surfaces and the lights' shares of the photons. Wants the lights packed.
     pub(super) fn pack_photons(&mut self) {
         self.frame.photon_sphere_count = 0;
-        self.frame.photon_spheres = [[0.0; 4]; MAX_PHOTON_SPHERES];
+        self.frame.photon_spheres = [[0.0; 4]; MAX_PHOTON_SPHERES + 1];
         self.frame.env_traced_above = f32::INFINITY;
         let moving = self.cover_smooth(self.resting.triangles..self.triangles.len());
         let covers: Vec<&Cover> = (self.resting_smooth_covers.iter().chain([&moving])).collect();
-        let spheres = Cover::spheres(&covers, MAX_PHOTON_SPHERES);
-        self.frame.photon_spheres[..spheres.len()].copy_from_slice(&spheres);
+        let mut spheres = Cover::spheres(&covers, MAX_PHOTON_SPHERES);
+        // What has no extent draws no photons; shaders find the end of the list by its radius.
+        spheres.retain(|sphere| sphere[3] > 0.0);
         let large = self.large_lights(&spheres);
         let powers: Vec<f64> = (self.lights.iter().zip(large))
             .map(|(light, is_large)| match is_large {
@@ -69,6 +70,7 @@ impl PackedScene {
         if total <= 0.0 {
             return;
         }
+        self.frame.photon_spheres[..spheres.len()].copy_from_slice(&spheres);
         self.frame.photon_sphere_count = spheres.len() as u32;
         let traced = powers.iter().filter(|&&power| power > 0.0).count() as f64;
         let mut sum = 0.0;

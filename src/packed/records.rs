@@ -85,8 +85,8 @@ shared! {
         pub spheres: [[f32; 4]; MAX_SPHERES],
         /// Anchor-relative position (w unused) and unit quaternion x, y, z, w of each pose.
         pub shutter_poses: [[f32; 4]; 2 * SHUTTER_POSES],
-        /// Bounding spheres of what photons are sent to, virtual surfaces that mirror or refract: centre, radius.
-        pub photon_spheres: [[f32; 4]; MAX_PHOTON_SPHERES],
+        /// Bounding spheres of what photons are sent to, virtual surfaces that mirror or refract: centre, radius. After the last one radius 0.
+        pub photon_spheres: [[f32; 4]; MAX_PHOTON_SPHERES + 1],
         /// k4, k5, k6, s1; s2, s3, s4, unused.
         pub distortion_more: [[f32; 4]; 2],
         /// 0: no photons are traced.

@@ -8,6 +8,7 @@ use serde::Deserialize;
 use super::TrackError;
 use super::board::{Board, BoardKind, square};
 use super::family::{FAMILIES, Family};
+use crate::decode::{MAX_TEXT_BYTES, read_text};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -76,7 +77,7 @@ struct Single {
 /// What cannot be used, with its line where the file is TOML.
 pub fn read_board(path: &Path) -> Result<Board, TrackError> {
     let at = |message: String| TrackError::input(format!("{}: {message}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|error| {
+    let text = read_text(path, MAX_TEXT_BYTES).map_err(|error| {
         at(format!(
             "it cannot be read ({error}); expected a board's description; correct the path"
         ))

@@ -10,6 +10,7 @@ use super::TrackError;
 use super::board::{Board, BoardKind};
 use super::board_file::{family_named, read_board};
 use super::light::Tone;
+use crate::decode::{MAX_POSES_BYTES, read_text};
 
 /// Standard deviation of a corner along an axis where paper is taken for flat, pixels.
 const NOISE_OF_FLAT_PX: f64 = 0.3;
@@ -58,7 +59,7 @@ struct Squares {
 /// # Errors
 /// What cannot be used.
 pub fn read_known_board(path: &Path) -> Result<KnownBoard, TrackError> {
-    let is_report = std::fs::read_to_string(path)
+    let is_report = read_text(path, MAX_POSES_BYTES)
         .ok()
         .filter(|text| text.trim_start().starts_with('{'));
     let Some(text) = is_report else {

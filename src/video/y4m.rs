@@ -78,7 +78,7 @@ impl Header {
     /// Parses the first line of a stream: "problem; expected ...; how to mend".
     pub fn parse(line: &str) -> Result<Self, Refusal> {
         let Some(rest) = line.strip_prefix(MAGIC) else {
-            return Err("it does not begin with YUV4MPEG2; expected a Y4M stream; make one with `ffmpeg -i VIDEO -pix_fmt yuv420p -f yuv4mpegpipe -`".into());
+            return Err(NO_SIGN.into());
         };
         let (mut width, mut height, mut rate) = (None, None, None);
         let (mut chroma, mut full_range) = (Chroma::C420, false);
@@ -215,6 +215,10 @@ impl<R: Read> Y4mReader<R> {
             return Err(place.error(format!(
                 "it is {kind}, no Y4M stream; expected frames without compression; convert it with `ffmpeg -i VIDEO -pix_fmt yuv420p -f yuv4mpegpipe -`"
             )));
+        }
+        let is_begun = MAGIC.as_bytes().starts_with(&begin);
+        if !is_begun && !begin.starts_with(MAGIC.as_bytes()) {
+            return Err(place.error(NO_SIGN));
         }
         let mut input_from_start = begin.as_slice().chain(&mut input);
         let line = read_line(&mut input_from_start, &place)?.ok_or_else(|| {
@@ -369,6 +373,8 @@ impl<R: Read> Y4mReader<R> {
         Ok(Some(Planes { planes, problem }))
     }
 }
+
+const NO_SIGN: &str = "it does not begin with YUV4MPEG2; expected a Y4M stream; make one with `ffmpeg -i VIDEO -pix_fmt yuv420p -f yuv4mpegpipe -`";
 
 /// How many bytes tell the kinds of films apart.
 const LONGEST_SIGN: u64 = 12;

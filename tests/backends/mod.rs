@@ -7,7 +7,9 @@ mod guide;
 mod photons;
 mod scenes;
 
-use mixray::gpu::{Features, GpuBackend, harness::test_device};
+use std::sync::Arc;
+
+use mixray::gpu::{Composer, Features, GpuBackend, SceneBuffers, SceneParts, harness::test_device};
 use mixray::renderer::{ErrorGoal, Renderer, Skip, Watcher, Without};
 use mixray::scene::BackendChoice;
 
@@ -51,21 +53,23 @@ each_case! {
     direct_with_everything,
 }
 
+/// What the kernels of a case hold.
+fn features_of(case: &Case) -> Features {
+    Features::for_scene(renderer(load(&case.text()), false).packed())
+}
+
 /// What the scenes between them use, and can do without.
 #[test]
 fn the_table_is_complete() {
     let names: Vec<&str> = CASES.iter().map(|case| case.name).collect();
     assert_eq!(names, TESTED);
-    let features: Vec<Features> = CASES
-        .iter()
-        .map(|case: &Case| Features::for_scene(renderer(load(&case.text()), false).packed()))
-        .collect();
+    let features: Vec<Features> = CASES.iter().map(features_of).collect();
     for (at, (flag, _)) in Features::default().flags().into_iter().enumerate() {
         for wanted in [true, false] {
             let found = features.iter().any(|f| f.flags()[at].1 == wanted);
             // What photons found is known once a render has begun: backends/guide.rs.
             let found = found || (flag == "guide" && wanted);
-            // Deep trees: kernels that are not specialised (the test of that name), and accel/tests.
+            // Deep trees: accel/tests.
             let found = found || (flag == "shallow_trees" && !wanted);
             assert!(found, "no scene has {flag} = {wanted}");
         }
@@ -169,8 +173,16 @@ fn specialisation_changes_no_more_than_rounding() {
     let built = renderer(load(&case.text()), case.all_planes);
     let film = |backend: &mut GpuBackend| gpu_film(backend, &built, case.all_planes);
     let (special, special_rays) = film(&mut backend_for(gpu, &built));
-    let mut general = GpuBackend::new(std::sync::Arc::clone(gpu), built.packed(), false)
+    let more = features_of(scenes::case("direct_with_everything"));
+    let needed = Features::for_scene(built.packed());
+    let pairs = || needed.flags().into_iter().zip(more.flags());
+    assert!(pairs().all(|((_, needed), (_, held))| held || !needed));
+    assert!(pairs().filter(|(needed, held)| needed != held).count() > 8);
+    let buffers = SceneBuffers::from_parts(gpu, &SceneParts::from(built.packed()))
         .unwrap_or_else(|error| panic!("{error}"));
+    let mut general =
+        GpuBackend::with_modules(Arc::clone(gpu), &Composer::default(), &more, buffers)
+            .unwrap_or_else(|error| panic!("{error}"));
     let (general, general_rays) = film(&mut general);
     let expected = planes(&built, &special);
     let difference = Difference::between(&expected, &planes(&built, &general));

@@ -24,6 +24,7 @@ fn frames_stamp() {
         ["0.000000.png", "0.066700.png"],
         ["000000.png", "066700.png"],
         ["0.png", "66700000.png"],
+        ["0.png", "0.0667.png"],
     ] {
         let folder = folder(&names, poses);
         folder.sequence_of("frames", "t.txt", "");

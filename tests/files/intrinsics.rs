@@ -193,6 +193,46 @@ fn cv_ros_fisheye_wide() {
     folder.refuse(command, "unified");
 }
 
+#[test]
+fn distortion_by_other_names() {
+    let folder = folder();
+    let focal = format!(
+        r#""w": 64, "h": 48, "fl_x": {FOCAL_PX}, "fl_y": {FOCAL_PX}, "cx": 32.0, "cy": 24.0,"#
+    );
+    let render = |distortion: &str| {
+        transforms(&folder, &format!("{focal}{distortion}"), "");
+        folder.sequence_of("frames", "transforms.json", "");
+        folder.bytes("out/f_0000.png")
+    };
+    let known = render(r#""k1": 0.8, "k2": 0.1, "p1": 0.01,"#);
+    for same in [
+        r#""distortion_params": [0.8, 0.1, 0, 0, 0.01, 0],"#,
+        r#""distortion_coefficients": [0.8, 0.1, 0.01, 0, 0],"#,
+        r#""distortion": {"k1": 0.8, "k2": 0.1, "p1": 0.01},"#,
+    ] {
+        assert_eq!(render(same), known, "{same}");
+    }
+    let none = render("");
+    assert_ne!(none, known, "control");
+    assert_eq!(render(r#""skew": 0, "radial_distortion": null,"#), none);
+    for unknown in [
+        r#""radial_distortion": [0.8, 0.1],"#,
+        r#""K1": 0.8,"#,
+        r#""skew": 3,"#,
+        r#""distortion_params": [1, 2, 3, 4, 5, 6, 7],"#,
+        r#""projection": "equirectangular","#,
+    ] {
+        transforms(&folder, &format!("{focal}{unknown}"), "");
+        let key = unknown.split('"').nth(1).unwrap();
+        let part = if key == "projection" {
+            "equirectangular is not known"
+        } else {
+            key
+        };
+        folder.refuse_sequence_of("frames", "transforms.json", part);
+    }
+}
+
 /// The model of the distortion says more than that of the camera.
 #[test]
 fn pinholes_with_the_distortion_of_a_fisheye() {

@@ -25,6 +25,14 @@ fn kitti() {
     folder.refuse_sequence_of("frames", "t.txt", "t.txt:2: 11 numbers where KITTI's");
     folder.write("t.txt", text.replacen("1 0 0 0.1", "2 0 0 0.1", 1));
     folder.refuse_sequence_of("frames", "t.txt", "not rigid");
+    // The first eight of more numbers would pass for a pose.
+    for (before, after, part) in [("0 ", "", "KITTI-360"), ("", " 0 0 0 1", "four rows")] {
+        let lines = [1, 2, 3].map(|n| format!("{before}{n} 1 0 0 0.1 0 0 0 1 0 0 -3{after}\n"));
+        folder.write("t.txt", lines.concat());
+        folder.refuse_sequence_of("frames", "t.txt", part);
+    }
+    folder.write("t.txt", format!("\u{feff}# of an editor\n{text}"));
+    folder.sequence_of("frames", "t.txt", "");
     let euroc = "#timestamp, p_RS_R_x [m], p_RS_R_y [m]\n1403636579758555392,4.68,-1.78\n";
     folder.write("t.txt", euroc);
     folder.refuse_sequence_of("frames", "t.txt", "EuRoC");
@@ -39,6 +47,15 @@ fn mp4() {
         (&b"\0\0\0\x20ftypisom\0\0\x02\0isom\n"[..], "MP4"),
         (&b"\x1a\x45\xdf\xa3\x01\0\0\0\0\0\0\x1f"[..], "Matroska"),
         (&b"RIFF\x24\0\0\0AVI LIST"[..], "AVI"),
+        (&b"\0\0\0\x08wide\0\0\0\x08mdat"[..], "QuickTime"),
+        (
+            &b"\x30\x26\xb2\x75\x8e\x66\xcf\x11\xa6\xd9\0\xaa"[..],
+            "Windows Media",
+        ),
+        (
+            &b"\x47\x40\x11\x10\0\x42\xf0\x25\0\x01\xc1\0"[..],
+            "YUV4MPEG2",
+        ),
     ] {
         folder.write("in.mp4", bytes);
         folder.refuse_sequence_of("in.mp4", "t.txt", kind);

@@ -169,8 +169,14 @@ fn png_cicp() {
     folder.write("p.png", with_chunks(&[(b"cICP", &[1, 13, 0, 1])]));
     assert!(!render(&folder).contains("warning"));
     assert_eq!(profile_of(&folder.bytes("out.png")), None, "control: sRGB");
-    folder.write("p.png", with_chunks(&[(b"cICP", &[9, 16, 0, 1])]));
-    assert!(render(&folder).contains("not understood"));
+    for hdr in [[9, 16, 0, 1], [9, 18, 0, 1]] {
+        folder.write("p.png", with_chunks(&[(b"cICP", &hdr)]));
+        let said = render(&folder);
+        assert!(
+            said.contains("PQ or HLG") && said.contains("OpenEXR"),
+            "{said}"
+        );
+    }
 }
 
 /// A JPEG whose orientation is 6: to be turned a quarter clockwise.

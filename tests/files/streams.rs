@@ -88,6 +88,12 @@ fn truncjpg() {
     let passed = folder.open("out/frame_000001.png");
     assert!(passed.get_pixel(63, 0)[0] > 200, "its upper half is there");
     assert_ne!(row(0, 47), row(1, 47), "control");
+    // Cut within its tables, which then seem to hold where the next begins.
+    folder.write("in.mjpg", [&whole[..], &whole[..30], &whole].concat());
+    folder.refuse_sequence_of("in.mjpg", "t.txt", "frame 1: it cannot be decoded");
+    let said = folder.sequence_of("in.mjpg", "t.txt", "--damaged-frames pass");
+    assert!(said.contains("the frame before stands for it"), "{said}");
+    assert_eq!(row(0, 47), row(2, 47), "the frame after it");
 }
 
 /// What of a PNG file is lost is grey.

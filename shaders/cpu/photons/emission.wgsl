@@ -1,6 +1,6 @@
 // Where photons begin. Rust twin: src/cpu/photons/emission.rs, where the densities are described.
 
-import package::gpu::buffers::{frame, lights};
+import package::gpu::buffers::{frame, has_photon_sphere, lights};
 import package::packed::records::{LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_QUAD, LIGHT_SPOT, Light};
 import package::shared::NONE;
 import package::math::{PI, TAU, cross3, dot3, length3, orthonormal_basis, safe_sqrt, sincos_2pi};
@@ -72,7 +72,7 @@ fn emit_environment(choice: f32, u: vec2<f32>, across: vec2<f32>) -> Emission {
 fn emit_parallel(travel: vec3<f32>, radiance: vec3<f32>, choice: f32, u: vec2<f32>) -> Emission {
     let aim = aim_parallel(travel, choice, u);
     var start = dot3(aim.towards, travel);
-    for (var i = 0u; i < frame.photon_sphere_count; i++) {
+    for (var i = 0u; has_photon_sphere(i); i++) {
         let sphere = frame.photon_spheres[i];
         start = min(start, dot3(sphere.xyz, travel) - sphere.w);
     }
@@ -162,13 +162,13 @@ fn holds(i: u32, position: vec3<f32>, direction: vec3<f32>) -> bool {
 
 fn aim_from(position: vec3<f32>, front: vec3<f32>, choice: f32, u: vec2<f32>) -> Aim {
     var total = 0.0;
-    for (var i = 0u; i < frame.photon_sphere_count; i++) {
+    for (var i = 0u; has_photon_sphere(i); i++) {
         total += solid_angle_of(i, position, front);
     }
     var left = choice * total;
     var chosen = NONE;
     var chosen_angle = 0.0;
-    for (var i = 0u; i < frame.photon_sphere_count; i++) {
+    for (var i = 0u; has_photon_sphere(i); i++) {
         let angle = solid_angle_of(i, position, front);
         if angle > 0.0 && (chosen == NONE || left >= 0.0) {
             chosen = i;
@@ -187,7 +187,7 @@ fn aim_from(position: vec3<f32>, front: vec3<f32>, choice: f32, u: vec2<f32>) ->
     let basis = orthonormal_basis(axis);
     let towards = basis.t * (sin * around.cos) + basis.b * (sin * around.sin) + axis * cos;
     var count = 0.0;
-    for (var i = 0u; i < frame.photon_sphere_count; i++) {
+    for (var i = 0u; has_photon_sphere(i); i++) {
         let counts = i == chosen || holds(i, position, towards);
         if counts && solid_angle_of(i, position, front) > 0.0 { count += 1.0; }
     }
@@ -196,13 +196,13 @@ fn aim_from(position: vec3<f32>, front: vec3<f32>, choice: f32, u: vec2<f32>) ->
 
 fn aim_parallel(travel: vec3<f32>, choice: f32, u: vec2<f32>) -> Aim {
     var total = 0.0;
-    for (var i = 0u; i < frame.photon_sphere_count; i++) {
+    for (var i = 0u; has_photon_sphere(i); i++) {
         let radius = frame.photon_spheres[i].w;
         total += PI * radius * radius;
     }
     var left = choice * total;
     var chosen = 0u;
-    for (var i = 0u; i < frame.photon_sphere_count; i++) {
+    for (var i = 0u; has_photon_sphere(i); i++) {
         if left >= 0.0 { chosen = i; }
         let radius = frame.photon_spheres[i].w;
         left -= PI * radius * radius;
@@ -213,7 +213,7 @@ fn aim_parallel(travel: vec3<f32>, choice: f32, u: vec2<f32>) -> Aim {
     let radius = sphere.w * safe_sqrt(u.x);
     let towards = sphere.xyz + (basis.t * (radius * around.cos) + basis.b * (radius * around.sin));
     var count = 0.0;
-    for (var i = 0u; i < frame.photon_sphere_count; i++) {
+    for (var i = 0u; has_photon_sphere(i); i++) {
         let other = frame.photon_spheres[i];
         let across = cross3(towards - other.xyz, travel);
         if i == chosen || dot3(across, across) <= other.w * other.w { count += 1.0; }

@@ -74,8 +74,12 @@ impl Naming {
     /// Of these file names.
     pub fn of<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Self {
         let stems = names.map(|name| stem(file_name(name)));
-        let is_epoch = |stem| trailing_fraction(stem).is_some_and(|t| EPOCH_SECS.contains(&t));
-        if stems.clone().all(is_fraction) || stems.clone().all(is_epoch) {
+        let is_epoch = |stem| trailing_secs(stem).is_some_and(|t| EPOCH_SECS.contains(&t));
+        let has_fraction = stems
+            .clone()
+            .any(|stem| is_fraction(&stem[before_secs(stem)..]));
+        let are_secs = stems.clone().all(is_decimal) || stems.clone().all(is_epoch);
+        if has_fraction && are_secs {
             return Self::Stamps(1.0);
         }
         let Some(mut numbers) = stems
@@ -94,9 +98,7 @@ impl Naming {
         }
         numbers.sort_unstable();
         let least = numbers.windows(2).map(|pair| pair[1] - pair[0]).min();
-        let are_whole = stems
-            .clone()
-            .all(|stem| stem.bytes().all(|b| b.is_ascii_digit()));
+        let are_whole = stems.clone().all(is_whole);
         match least.filter(|least| are_whole && *least >= LEAST_STEP) {
             Some(LEAST_STEP_NS..) => Self::Stamps(1e9),
             Some(_) => Self::Stamps(1e6),
@@ -138,9 +140,8 @@ impl Naming {
             return None;
         };
         let stem = stem(file_name(name));
-        match is_fraction(stem) {
-            true => stem.parse().ok(),
-            false if unit == 1.0 => trailing_fraction(stem),
+        match unit == 1.0 {
+            true => trailing_secs(stem),
             false => Some(trailing_digits(stem)? as f64 / unit),
         }
     }
@@ -179,16 +180,29 @@ pub(super) fn stem(file: &str) -> &str {
     }
 }
 
-fn is_fraction(stem: &str) -> bool {
-    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    (stem.split_once('.')).is_some_and(|(whole, fraction)| digits(whole) && digits(fraction))
+fn is_whole(stem: &str) -> bool {
+    !stem.is_empty() && stem.bytes().all(|b| b.is_ascii_digit())
 }
 
-/// Seconds with a fraction at the end of a name.
-fn trailing_fraction(stem: &str) -> Option<f64> {
-    let before = stem.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
-    let number = &stem[before.len()..];
-    is_fraction(number).then(|| number.parse().ok())?
+fn is_fraction(stem: &str) -> bool {
+    (stem.split_once('.')).is_some_and(|(whole, fraction)| is_whole(whole) && is_whole(fraction))
+}
+
+/// Of names of seconds some may be whole.
+fn is_decimal(stem: &str) -> bool {
+    is_whole(stem) || is_fraction(stem)
+}
+
+/// Where the number at the end of a name begins.
+fn before_secs(stem: &str) -> usize {
+    stem.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.')
+        .len()
+}
+
+/// Seconds at the end of a name.
+fn trailing_secs(stem: &str) -> Option<f64> {
+    let number = &stem[before_secs(stem)..];
+    is_decimal(number).then(|| number.parse().ok())?
 }
 
 fn digit_runs(stem: &str) -> impl Iterator<Item = &str> {
@@ -212,6 +226,9 @@ mod tests {
             naming(&["0.000000.png", "0.033300.png"]),
             Naming::Stamps(1.0)
         );
+        let some_whole = ["0.png", "0.0333.png", "0.0667.png", "1.png"];
+        assert_eq!(naming(&some_whole), Naming::Stamps(1.0));
+        assert_eq!(Naming::Stamps(1.0).time_secs("1.png"), Some(1.0));
         let ns = ["1403636579763555584.png", "1403636579813555456.png"];
         assert_eq!(naming(&ns), Naming::Stamps(1e9));
         let secs = naming(&ns).time_secs(ns[1]).expect("a stamp");

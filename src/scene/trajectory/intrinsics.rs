@@ -101,6 +101,20 @@ const MODEL_KEYS: [&str; 4] = [
     "camera_type",
 ];
 
+/// In words about a projection that may stand under any key: those that are none of OpenCV's.
+const OTHER_MODELS: [&str; 10] = [
+    "equirect",
+    "spherical",
+    "panoram",
+    "omni",
+    "cylind",
+    "stereograph",
+    "equisolid",
+    "orthogra",
+    "double_sphere",
+    "unified",
+];
+
 /// The lens models of OpenCV under all of their names, from the least to the most special.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum LensModel {
@@ -171,6 +185,10 @@ impl LensModel {
                 .iter()
                 .any(|word| key.contains(word))
             {
+                let lower = value.to_ascii_lowercase();
+                if OTHER_MODELS.iter().any(|word| lower.contains(word)) {
+                    return Self::named(&value).map(Some);
+                }
                 Self::named(&value)
                     .ok()
                     .filter(|model| *model == Self::Fisheye)

@@ -97,36 +97,96 @@ impl Style {
     }
 }
 
-/// In a table or list `distortion`, or side by side.
+/// Lists of OpenCV's coefficients in order.
+const LISTS: [&str; 5] = [
+    "distortion",
+    "distortion_coefficients",
+    "distortion_coeffs",
+    "dist_coeffs",
+    "coeffs",
+];
+/// nerfstudio's list.
+const PARAMS: &str = "distortion_params";
+const ORDER_OF_PARAMS: [&str; 6] = ["k1", "k2", "k3", "k4", "p1", "p2"];
+/// A list for a fisheye: four, and what it has none of.
+const OF_FISHEYES: [&str; 12] = [
+    "k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "s1", "s2", "s3", "s4",
+];
+
+/// In a table or list, or side by side.
 fn coefficients(table: &Object, is_fisheye: bool) -> Problem<[Option<f64>; 12]> {
-    let mut found = [None; 12];
-    let named = match table.get("distortion") {
+    refuse_unknown(table)?;
+    if let Some(params) = table.get(PARAMS) {
+        let values = params
+            .as_array()
+            .filter(|values| values.len() <= ORDER_OF_PARAMS.len());
+        let values = values.ok_or_else(|| not_understood(PARAMS))?;
+        return in_order(values, &ORDER_OF_PARAMS);
+    }
+    let list = LISTS
+        .iter()
+        .find_map(|key| Some((*key, table.get(*key)?)))
+        .filter(|(_, value)| !value.is_null());
+    let named = match list {
         None => table,
         // Said in words.
-        Some(Value::String(text)) if text.to_ascii_lowercase().starts_with("none") => {
-            return Ok(found);
+        Some((_, Value::String(text))) if text.to_ascii_lowercase().starts_with("none") => {
+            return Ok([None; 12]);
         }
-        Some(Value::Object(named)) => named,
-        Some(Value::Array(values)) if [4, 5, 8, 12].contains(&values.len()) => {
-            // A fisheye's four are k1 to k4.
-            let fisheye = [0, 1, 4, 5];
-            for (place, value) in values.iter().enumerate() {
-                let place = match is_fisheye {
-                    true => *fisheye.get(place).unwrap_or(&place),
-                    false => place,
-                };
-                found[place] = Some(number(value, "a distortion coefficient")?);
-            }
-            return Ok(found);
+        Some((_, Value::Object(named))) => named,
+        Some((_, Value::Array(values))) if [0, 4, 5, 8, 12].contains(&values.len()) => {
+            let order: &[&str] = match is_fisheye {
+                true => &OF_FISHEYES,
+                false => &COEFFICIENTS,
+            };
+            return in_order(values, order);
         }
-        Some(_) => {
-            return Err("`distortion` is not understood; expected OpenCV's coefficients as a list of 4, 5, 8 or 12; correct it".to_owned());
-        }
+        Some((key, _)) => return Err(not_understood(key)),
     };
+    let mut found = [None; 12];
     for (k, key) in found.iter_mut().zip(COEFFICIENTS) {
         *k = named.get(key).map(|value| number(value, key)).transpose()?;
     }
     Ok(found)
+}
+
+/// Values of the coefficients of these names.
+fn in_order(values: &[Value], names: &[&str]) -> Problem<[Option<f64>; 12]> {
+    let mut found = [None; 12];
+    for (value, name) in values.iter().zip(names) {
+        let place = COEFFICIENTS.iter().position(|own| own == name);
+        let place = place.ok_or_else(|| not_understood("distortion"))?;
+        found[place] = Some(number(value, "a distortion coefficient")?);
+    }
+    Ok(found)
+}
+
+fn not_understood(key: &str) -> String {
+    format!(
+        "`{key}` is not understood; expected OpenCV's coefficients side by side (k1, k2, p1, ...), or `distortion` as a list of 4, 5, 8 or 12 of them; correct it"
+    )
+}
+
+/// A distortion by a name that is not known would be left out.
+fn refuse_unknown(table: &Object) -> Problem<()> {
+    let says_something = |value: &Value| match value {
+        Value::Number(number) => number.as_f64() != Some(0.0),
+        Value::Array(values) => values.iter().any(|value| value.as_f64() != Some(0.0)),
+        Value::Object(_) => true,
+        _ => false,
+    };
+    let is_unknown = |key: &str| {
+        let lower = key.to_ascii_lowercase();
+        let is_own = LISTS.contains(&key) || key == PARAMS || key == "distortion_model";
+        let means_it = ["distort", "radial", "tangential", "skew", "dist_co"];
+        !is_own
+            && (means_it.iter().any(|word| lower.contains(word))
+                || COEFFICIENTS.contains(&lower.as_str()) && !COEFFICIENTS.contains(&key))
+    };
+    let unknown = table
+        .iter()
+        .find(|(key, value)| is_unknown(key) && says_something(value));
+    unknown.map_or(Ok(()), |(key, _)| Err(not_understood(key)))
 }
 
 /// Wherever the table says it: by a name, or that it is a fisheye.

@@ -36,7 +36,7 @@ use glam::{DMat3, DMat4, DQuat, DVec3};
 
 use super::SceneError;
 use super::pose::rigid;
-use crate::decode::{MAX_POSES_BYTES, read_file};
+use crate::decode::{MAX_POSES_BYTES, read_file, text_of};
 
 /// Why a trajectory was refused. Displays as one line: "problem; expected ...; how to mend", with the file before it.
 #[derive(Debug, thiserror::Error)]
@@ -194,7 +194,7 @@ fn read_text(path: &Path) -> Result<String> {
             format!("it cannot be read ({reason}); expected a file of poses; correct the path"),
         )
     })?;
-    String::from_utf8(bytes).map_err(|_| {
+    text_of(bytes).ok_or_else(|| {
         file_error(
             path,
             "it is no UTF-8 text; expected TOML, JSON, COLMAP or TUM text; export it as text",

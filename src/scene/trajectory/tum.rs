@@ -43,6 +43,12 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Trajectory> {
 
 fn read_line(words: &[&str], place: u32, number: usize) -> std::result::Result<Entry, String> {
     let form = "timestamp tx ty tz qx qy qz qw";
+    if let Some(other) = other_form(words.len()) {
+        return Err(format!(
+            "{} numbers, as {other}; expected {form}, or KITTI's twelve; convert the file",
+            words.len()
+        ));
+    }
     let [time, x, y, z, qx, qy, qz, qw] = numbers::<8>(words, form)?;
     let quaternion = DQuat::from_xyzw(qx, qy, qz, qw);
     let pose = pose_of_quaternion(quaternion, DVec3::new(x, y, z))?;
@@ -54,4 +60,15 @@ fn read_line(words: &[&str], place: u32, number: usize) -> std::result::Result<E
         intrinsics: None,
         focus_distance_m: None,
     })
+}
+
+/// What is written in lines of so many numbers, of which the first eight would pass for a pose.
+fn other_form(words: usize) -> Option<&'static str> {
+    match words {
+        13 => Some("in KITTI-360's poses, a frame's number before three rows"),
+        16 => Some("in matrices of four rows"),
+        17 => Some("in KITTI-360's poses, a frame's number before four rows"),
+        9.. => Some("in no list of poses that is known"),
+        _ => None,
+    }
 }
