@@ -111,7 +111,7 @@ fn cells(time: &GpuTime) -> Vec<String> {
     ]
 }
 
-fn device_line(machine: &Machine) -> String {
+pub(super) fn device_line(machine: &Machine) -> String {
     match &machine.gpu {
         Some(gpu) => {
             let kind = if gpu.hardware { "" } else { ", software" };

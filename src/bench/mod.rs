@@ -2,7 +2,7 @@
 //!
 //! [`measure`] renders methods in turns against a [`Truth`] that [`reference`] makes; [`Report`] keeps the figures, and the other modules
 //! make tables, plots and a page of it or compare it with an earlier one. [`grow`] finds how the cost grows with the work, [`gpu_time`] where a
-//! GPU's time goes, [`kernel_code`] what its compiler makes of the kernels, and [`stress`] what breaks renderers.
+//! GPU's time goes, [`gpu_frames`] where the host's, [`kernel_code`] what its compiler makes of the kernels, and [`stress`] what breaks renderers.
 
 mod against;
 mod chart;
@@ -12,6 +12,7 @@ mod errors;
 mod fit;
 mod goal;
 mod gpu_code;
+mod gpu_frame;
 mod gpu_time;
 mod growth;
 mod machine;
@@ -36,6 +37,7 @@ pub use gpu_code::{
     Compiler, CompilerError, GpuCodeError, KernelCode, Variant, further_variants,
     gpu_code_markdown, gpu_code_text, kernel_code, variant_of,
 };
+pub use gpu_frame::{GpuFrame, gpu_frame_markdown, gpu_frame_text, gpu_frames};
 pub use gpu_time::{GpuTime, gpu_time, gpu_time_markdown, gpu_time_text};
 pub use growth::{Curve, Law, Point, grow, growth_csv, growth_markdown, growth_plot, growth_text};
 pub use machine::{Gpu, Machine};

@@ -1,8 +1,19 @@
 //! The film: sums over camera samples, a record a pixel.
 
+use bytemuck::Zeroable;
+
 use crate::film::groups::GroupSums;
 use crate::film::splats::{Splat, SplatSums, is_unusable_splat};
 use crate::film::sums::{GuideSums, PixelSums, count_unusable};
+
+/// Empties the records, and makes as many as are wanted; memory that is there is used again.
+fn make_room<T: Zeroable + Clone>(records: &mut Vec<T>, count: usize) {
+    if records.len() == count {
+        records.fill(T::zeroed());
+    } else {
+        *records = bytemuck::zeroed_vec(count);
+    }
+}
 
 /// What a pixel shows, known from the samples taken so far (design: background M = 0, virtual M = 1, edge between).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,14 +93,12 @@ impl Film {
 
     /// Makes room for groups of samples, or takes it back; none are kept.
     pub fn set_groups(&mut self, kept: bool) {
-        let count = if kept { self.pixels.len() } else { 0 };
-        self.groups = bytemuck::zeroed_vec(count);
+        make_room(&mut self.groups, if kept { self.pixels.len() } else { 0 });
     }
 
     /// Makes room for photons, or takes it back; none are kept.
     pub fn set_photons(&mut self, traced: bool) {
-        let count = if traced { self.pixels.len() } else { 0 };
-        self.splats = bytemuck::zeroed_vec(count);
+        make_room(&mut self.splats, if traced { self.pixels.len() } else { 0 });
     }
 
     /// Photons that every pixel has seen traced.
@@ -126,6 +135,12 @@ impl Film {
         for (sums, factor) in self.pixels.iter_mut().zip(factors) {
             sums.sample_factor = factor;
         }
+    }
+
+    /// Takes all samples back for another plan of samples, in the memory that is there; [`Film::set_groups`] and [`Film::set_photons`] follow.
+    pub fn renew(&mut self) {
+        self.pixels.fill(PixelSums::default());
+        self.guides.fill(GuideSums::default());
     }
 
     /// Takes all samples back; the plan of samples stays.

@@ -97,6 +97,13 @@ pub fn is_unusable(x: Vec3) -> bool {
         .any(|c| c.to_bits() & 0x7fff_ffff > LARGEST_SAMPLE_BITS)
 }
 
+impl PixelSums {
+    /// No sample has reached it.
+    pub fn is_empty(&self) -> bool {
+        self.n == 0 && self.n_real == 0 && self.non_finite == 0
+    }
+}
+
 impl Sum3 {
     pub fn value(&self) -> DVec3 {
         DVec3::from_array([0, 1, 2].map(|c| f64::from(self.hi[c]) + f64::from(self.lo[c])))

@@ -11,8 +11,12 @@ use crate::packed::{
 /// What an edit has changed in a packed scene; each includes those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Changed {
-    /// Camera, lens, sampling, and what the photograph tells of the albedo.
+    /// Lens and sampling, and what is planned for them.
+    Plan,
+    /// The camera's pose, and what the photograph tells of the albedo.
     View,
+    /// The photograph.
+    Photo,
     /// Where the moving virtual objects are, and the lights.
     Moving,
     /// All of the virtual world.
@@ -147,8 +151,7 @@ impl SceneBuffers {
 
     /// Replaces the frame (camera, lens and sampling) by that of `parts`, whose arrays are those that are here.
     pub fn set_frame(&self, gpu: &GpuDevice, parts: &SceneParts<'_>) {
-        gpu.queue
-            .write_buffer(&self.frame, 0, bytemuck::bytes_of(&with_bases(parts)));
+        gpu.write(&self.frame, 0, bytemuck::bytes_of(&with_bases(parts)));
     }
 
     /// The buffer of that name in `shaders/gpu/buffers.wgsl`.
@@ -186,7 +189,7 @@ impl Array<'_> {
         let mut offset = 0;
         for (changed_by, bytes) in &self.pieces {
             if *changed_by <= changed {
-                gpu.queue.write_buffer(buffer, offset, bytes);
+                gpu.write(buffer, offset, bytes);
             }
             offset += bytes.len() as u64;
         }
@@ -194,7 +197,7 @@ impl Array<'_> {
 }
 
 fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 15] {
-    use Changed::{All, Moving, View, Virtual};
+    use Changed::{All, Moving, Photo, Plan, View, Virtual};
     let array = |name, what, pieces| Array { name, what, pieces };
     let SceneParts {
         frame: _,
@@ -243,14 +246,14 @@ fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 15] {
             "albedo of the photograph",
             vec![piece(View, photo_albedo)],
         ),
-        array("guide", "guide", vec![piece(View, guide)]),
-        array("backdrop", "photograph", vec![piece(View, backdrop)]),
+        array("guide", "guide", vec![piece(Plan, guide)]),
+        array("backdrop", "photograph", vec![piece(Photo, backdrop)]),
         array(
             "facet_tables",
             "tables of rough lobes",
             vec![piece(Virtual, facet_tables)],
         ),
-        array("pixels", "pixels", vec![piece(View, pixels)]),
+        array("pixels", "pixels", vec![piece(Plan, pixels)]),
         array(
             "bvh_nodes",
             "BVH nodes",
@@ -372,6 +375,44 @@ mod tests {
         assert_eq!(text.matches("@binding").count(), names.len());
         // Negative control: a name that no shader declares.
         assert!(bound(&["frame", "vertexes"]).is_err());
+    }
+
+    #[test]
+    fn an_edit_sends_what_it_changes_and_no_more() {
+        if crate::gpu::harness::test_device().is_none() {
+            return;
+        }
+        let gpu = GpuDevice::open(AdapterChoice::Any).expect("opens");
+        let pixels = [PixelInfo::uniform(0); 10];
+        let parts = SceneParts {
+            pixels: &pixels,
+            photo_albedo: &[[0.5; 4]; 3],
+            backdrop: &[0.5; 30],
+            ..SceneParts::default()
+        };
+        let scene = SceneBuffers::from_parts(&gpu, &parts).expect("fits");
+        let frame = size_of::<Frame>() as u64;
+        for (changed, bytes) in [
+            (Changed::Plan, 120),
+            (Changed::View, 120 + 48),
+            (Changed::Photo, 120 + 48 + 120),
+            (Changed::Virtual, 120 + 48 + 120),
+        ] {
+            let before = gpu.traffic();
+            assert!(scene.update(&gpu, &parts, changed));
+            assert_eq!(
+                (gpu.traffic() - before).bytes_up,
+                frame + bytes,
+                "{changed:?}"
+            );
+        }
+        assert!(!scene.update(&gpu, &parts, Changed::All), "made anew");
+        let more = [PixelInfo::uniform(0); 1000];
+        let parts = SceneParts {
+            pixels: &more,
+            ..parts
+        };
+        assert!(!scene.update(&gpu, &parts, Changed::Plan), "no room");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use super::GpuError;
+use super::traffic::{Traffic, TrafficCounter, count};
 
 /// A submission that has not ended by then never will: a fraction of a second is the rule, shader compilation on a software device
 /// the exception.
@@ -33,6 +34,7 @@ pub struct GpuDevice {
     /// GPU timestamps can be taken.
     pub timestamps: bool,
     fault: Arc<Mutex<Option<String>>>,
+    traffic: TrafficCounter,
 }
 
 /// One line of `mixray info`: an adapter and the limits that matter here.
@@ -210,6 +212,7 @@ impl GpuDevice {
             limits,
             timestamps,
             fault,
+            traffic: TrafficCounter::default(),
         })
     }
 
@@ -227,11 +230,34 @@ impl GpuDevice {
         }
     }
 
+    /// What went to it and back since it was opened.
+    pub fn traffic(&self) -> Traffic {
+        self.traffic.counts()
+    }
+
+    /// Sends `bytes`, which arrive before the next submission begins.
+    pub fn write(&self, buffer: &wgpu::Buffer, offset: u64, bytes: &[u8]) {
+        count(&self.traffic.bytes_up, bytes.len() as u64);
+        self.queue.write_buffer(buffer, offset, bytes);
+    }
+
+    /// Submits commands with so many dispatches.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn submit(&self, encoder: wgpu::CommandEncoder, dispatches: u64) -> Result<(), GpuError> {
+        count(&self.traffic.submissions, 1);
+        count(&self.traffic.dispatches, dispatches);
+        self.queue.submit([encoder.finish()]);
+        self.check()
+    }
+
     /// Submits and waits for the end.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
     pub fn submit_and_wait(&self, encoder: wgpu::CommandEncoder) -> Result<(), GpuError> {
+        count(&self.traffic.submissions, 1);
         let index = self.queue.submit([encoder.finish()]);
         self.wait(Some(index))
     }
@@ -252,12 +278,24 @@ impl GpuDevice {
     /// # Errors
     /// [`GpuError::Lost`].
     pub fn read(&self, staging: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>, GpuError> {
-        let slice = staging.slice(..bytes);
+        self.map(staging, bytes)?;
+        self.take_mapped(staging, bytes, <[u8]>::to_vec)
+    }
+
+    /// Waits until everything submitted has ended, and maps a buffer made with MAP_READ; [`GpuDevice::take_mapped`] follows.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn map(&self, staging: &wgpu::Buffer, bytes: u64) -> Result<(), GpuError> {
+        count(&self.traffic.waits, 1);
+        count(&self.traffic.bytes_down, bytes);
         let (sender, receiver) = mpsc::channel();
-        slice.map_async(wgpu::MapMode::Read, move |result| {
-            // The receiver outlives the poll below; if it does not, nobody waits for the answer.
-            let _ = sender.send(result);
-        });
+        staging
+            .slice(..bytes)
+            .map_async(wgpu::MapMode::Read, move |result| {
+                // The receiver outlives the poll below; if it does not, nobody waits for the answer.
+                let _ = sender.send(result);
+            });
         let lost = |message: String| GpuError::Lost(message);
         // Where several threads poll, another one may be about to run our callback when this one's poll returns.
         let deadline = Instant::now() + PATIENCE;
@@ -269,13 +307,25 @@ impl GpuDevice {
                 Err(error) => return Err(lost(error.to_string())),
             }
         };
-        answer.map_err(|error| lost(error.to_string()))?;
-        let data = slice
-            .get_mapped_range()
-            .map_err(|error| lost(error.to_string()))?
-            .to_vec();
+        answer.map_err(|error| lost(error.to_string()))
+    }
+
+    /// What `take` makes of the bytes of a mapped buffer, which is unmapped.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn take_mapped<T>(
+        &self,
+        staging: &wgpu::Buffer,
+        bytes: u64,
+        take: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T, GpuError> {
+        let mapped = staging.slice(..bytes).get_mapped_range();
+        let taken = mapped
+            .map(|mapped| take(&mapped))
+            .map_err(|error| GpuError::Lost(error.to_string()));
         staging.unmap();
-        Ok(data)
+        taken
     }
 
     /// Runs `make` and turns what the driver objects to into an error.
@@ -330,9 +380,10 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_back() {
-        let Some(gpu) = crate::gpu::harness::test_device() else {
+        if crate::gpu::harness::test_device().is_none() {
             return;
-        };
+        }
+        let gpu = GpuDevice::open(AdapterChoice::Any).expect("opens");
         let words: Vec<u32> = (0..999).collect();
         let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: None,
@@ -340,11 +391,19 @@ mod tests {
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        gpu.queue
-            .write_buffer(&buffer, 0, bytemuck::cast_slice(&words));
+        let before = gpu.traffic();
+        gpu.write(&buffer, 0, bytemuck::cast_slice(&words));
         let encoder = gpu.device.create_command_encoder(&Default::default());
-        gpu.submit_and_wait(encoder).expect("submits");
+        gpu.submit(encoder, 0).expect("submits");
         let bytes = gpu.read(&buffer, 4 * 500).expect("reads");
         assert_eq!(bytes, bytemuck::cast_slice::<u32, u8>(&words[..500]));
+        let traffic = Traffic {
+            bytes_up: 4 * 999,
+            bytes_down: 4 * 500,
+            submissions: 1,
+            dispatches: 0,
+            waits: 1,
+        };
+        assert_eq!(gpu.traffic() - before, traffic);
     }
 }

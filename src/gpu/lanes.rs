@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::mem::offset_of;
 
-use bytemuck::{AnyBitPattern, Pod, Zeroable};
+use bytemuck::{AnyBitPattern, NoUninit, Pod, Zeroable};
 
 use super::kernel::Kernel;
 use super::{GpuDevice, GpuError};
@@ -85,42 +85,6 @@ impl Beside {
             guides: !film.guides.is_empty(),
             groups: !film.groups.is_empty(),
         }
-    }
-}
-
-/// Sums of some pixels of a film, one after the other.
-#[derive(Clone, Debug, Default)]
-pub struct Gathered {
-    pub sums: Vec<PixelSums>,
-    /// Empty where the film has none.
-    pub guides: Vec<GuideSums>,
-    pub groups: Vec<GroupSums>,
-}
-
-impl Gathered {
-    pub fn of(film: &Film, work: &[PixelWork]) -> Self {
-        fn some<T: Copy>(all: &[T], work: &[PixelWork]) -> Vec<T> {
-            let each = work.iter();
-            each.filter_map(|work| all.get(work.pixel as usize).copied())
-                .collect()
-        }
-        Self {
-            sums: some(&film.pixels, work),
-            guides: some(&film.guides, work),
-            groups: some(&film.groups, work),
-        }
-    }
-
-    /// Puts them back.
-    pub fn scatter(self, film: &mut Film, work: &[PixelWork]) {
-        fn put<T>(all: &mut [T], work: &[PixelWork], some: Vec<T>) {
-            for (work, sums) in work.iter().zip(some) {
-                all[work.pixel as usize] = sums;
-            }
-        }
-        put(&mut film.pixels, work, self.sums);
-        put(&mut film.guides, work, self.guides);
-        put(&mut film.groups, work, self.groups);
     }
 }
 
@@ -229,16 +193,35 @@ impl Lanes {
         })
     }
 
-    pub fn upload(&self, gpu: &GpuDevice, work: &[PixelWork], gathered: &Gathered) {
-        let write = |buffer, bytes| gpu.queue.write_buffer(buffer, 0, bytes);
-        write(&self.work, bytemuck::cast_slice(work));
-        write(&self.pixel_sums, bytemuck::cast_slice(&gathered.sums));
-        write(&self.guide_sums, bytemuck::cast_slice(&gathered.guides));
-        write(&self.group_sums, bytemuck::cast_slice(&gathered.groups));
+    /// Sends which samples are taken of which pixels.
+    pub fn upload_work(&self, gpu: &GpuDevice, work: &[PixelWork]) {
+        gpu.write(&self.work, 0, bytemuck::cast_slice(work));
     }
 
-    pub fn clear_counters(&self, gpu: &GpuDevice) {
-        (gpu.queue).write_buffer(&self.counters, 0, &[0; COUNTERS_BYTES as usize]);
+    /// Sends the sums of these pixels.
+    pub fn upload_sums(&self, gpu: &GpuDevice, film: &Film, work: &[PixelWork]) {
+        fn send<T: NoUninit>(gpu: &GpuDevice, to: &wgpu::Buffer, all: &[T], work: &[PixelWork]) {
+            let of_pixel = |work: &PixelWork| all.get(work.pixel as usize).copied();
+            let some: Vec<T> = work.iter().filter_map(of_pixel).collect();
+            gpu.write(to, 0, bytemuck::cast_slice(&some));
+        }
+        send(gpu, &self.pixel_sums, &film.pixels, work);
+        send(gpu, &self.guide_sums, &film.guides, work);
+        send(gpu, &self.group_sums, &film.groups, work);
+    }
+
+    /// Sets the sums of the first `pixels` slots to 0.
+    pub fn clear_sums(&self, encoder: &mut wgpu::CommandEncoder, pixels: usize) {
+        let parts = [&self.pixel_sums, &self.guide_sums, &self.group_sums];
+        for (buffer, bytes) in parts.into_iter().zip(self.sums_bytes(pixels)) {
+            if bytes > 0 {
+                encoder.clear_buffer(buffer, 0, Some(bytes));
+            }
+        }
+    }
+
+    pub fn clear_counters(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.clear_buffer(&self.counters, 0, None);
     }
 
     pub fn copy_counters(&self, encoder: &mut wgpu::CommandEncoder) {
@@ -271,25 +254,49 @@ impl Lanes {
         Ok(bytemuck::pod_read_unaligned(&bytes))
     }
 
-    /// What [`Lanes::copy_counters`] and [`Lanes::copy_sums`] copied; no guides or groups unless there are any.
+    /// Waits for what [`Lanes::copy_counters`] and [`Lanes::copy_sums`] copied.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn wait_for_sums(&self, gpu: &GpuDevice, pixels: usize) -> Result<(), GpuError> {
+        gpu.map(&self.staging, self.read_bytes(pixels))
+    }
+
+    /// After [`Lanes::wait_for_sums`]: puts the sums of these pixels into the film.
     ///
     /// # Errors
     /// [`GpuError::Lost`].
     pub fn read_sums(
         &self,
         gpu: &GpuDevice,
-        pixels: usize,
-    ) -> Result<(Counters, Gathered), GpuError> {
-        let [sums, guides, groups] = self.sums_bytes(pixels);
-        let bytes = gpu.read(&self.staging, COUNTERS_BYTES + sums + guides + groups)?;
-        let (counters, rest) = bytes.split_at(COUNTERS_BYTES as usize);
-        let (sums, rest) = rest.split_at(sums as usize);
-        let (guides, groups) = rest.split_at(guides as usize);
-        let gathered = Gathered {
-            sums: bytemuck::pod_collect_to_vec(sums),
-            guides: bytemuck::pod_collect_to_vec(guides),
-            groups: bytemuck::pod_collect_to_vec(groups),
-        };
-        Ok((bytemuck::pod_read_unaligned(counters), gathered))
+        film: &mut Film,
+        work: &[PixelWork],
+    ) -> Result<Counters, GpuError> {
+        fn put<T: AnyBitPattern>(all: &mut [T], work: &[PixelWork], bytes: &[u8]) {
+            for (work, bytes) in work.iter().zip(bytes.chunks_exact(size_of::<T>())) {
+                all[work.pixel as usize] = bytemuck::pod_read_unaligned(bytes);
+            }
+        }
+        let [sums, guides, _] = self.sums_bytes(work.len());
+        gpu.take_mapped(&self.staging, self.read_bytes(work.len()), |bytes| {
+            let (counters, rest) = bytes.split_at(COUNTERS_BYTES as usize);
+            let (sums, rest) = rest.split_at(sums as usize);
+            let (guides, groups) = rest.split_at(guides as usize);
+            for (work, sums) in work.iter().zip(sums.chunks_exact(size_of::<PixelSums>())) {
+                // The device does not know the factor where it began with cleared sums.
+                let kept = &mut film.pixels[work.pixel as usize];
+                *kept = PixelSums {
+                    sample_factor: kept.sample_factor,
+                    ..bytemuck::pod_read_unaligned(sums)
+                };
+            }
+            put(&mut film.guides, work, guides);
+            put(&mut film.groups, work, groups);
+            bytemuck::pod_read_unaligned(counters)
+        })
+    }
+
+    fn read_bytes(&self, pixels: usize) -> u64 {
+        COUNTERS_BYTES + self.sums_bytes(pixels).iter().sum::<u64>()
     }
 }

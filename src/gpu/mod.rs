@@ -13,6 +13,7 @@ mod lanes;
 mod pacer;
 mod photons;
 mod profile;
+mod traffic;
 pub mod wavefront;
 
 pub use buffers::{Changed, SceneBuffers, SceneParts};
@@ -20,6 +21,7 @@ pub use compose::{Composer, Features};
 pub use device::{AdapterChoice, AdapterReport, GpuDevice, list_adapters};
 pub use photons::PHOTON_KERNEL;
 pub use profile::{KERNELS, KernelSeconds};
+pub use traffic::Traffic;
 pub use wavefront::GpuBackend;
 
 /// What can go wrong on the GPU, in the words the user gets.

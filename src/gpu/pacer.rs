@@ -43,6 +43,11 @@ impl Pacer {
         self.lanes
     }
 
+    /// Lanes to make room for where so many are wanted: powers of two, so that buffers are seldom made anew while the pace is found.
+    pub fn room(&self, wanted: usize) -> usize {
+        wanted.next_power_of_two().min(self.most_lanes).max(wanted)
+    }
+
     /// Steps that the next submission may take with so many lanes alive.
     pub fn steps(&self, alive: usize) -> usize {
         match self.secs_per_step {
@@ -85,6 +90,19 @@ mod tests {
             }
         }
         (longest, pacer.lanes())
+    }
+
+    #[test]
+    fn room_is_made_a_few_times_only() {
+        let pacer = Pacer::new(100_000);
+        let mut rooms: Vec<usize> = (1..=100_000).map(|wanted| pacer.room(wanted)).collect();
+        rooms.dedup();
+        assert!(rooms.is_sorted() && rooms.len() <= 18, "{rooms:?}");
+        assert_eq!(
+            rooms.last(),
+            Some(&100_000),
+            "no more than the device allows"
+        );
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::{Composer, Features, GpuDevice, GpuError, SceneBuffers};
 use crate::cpu::photons::path::SEQUENCE_BITS;
 use crate::film::{Film, Splat};
 use crate::shared::{WORKGROUP, shared};
-use crate::work::{PhotonWork, RayCounts, Watcher};
+use crate::work::{PhotonWork, Place, Places, RayCounts, Watcher};
 
 shared! {
     /// Uniform of a batch of photons of one sequence.
@@ -126,6 +126,7 @@ impl Photons {
         film: &mut Film,
         work: &PhotonWork,
         rays: &mut RayCounts,
+        places: &mut Places,
         watcher: &Watcher<'_>,
     ) -> Result<(), GpuError> {
         let mut first = work.first;
@@ -144,12 +145,13 @@ impl Photons {
                 pad: [0; 2],
             };
             let begin = Instant::now();
-            let [listed, mixed, mixed_shadow] = self.run(gpu, &batch)?;
+            let [listed, mixed, mixed_shadow] = self.run(gpu, &batch, places)?;
             if listed > LARGEST_BATCH {
                 // No room for all: again, fewer at a time.
                 self.next_batch = (self.next_batch / 2).max(WORKGROUP);
                 continue;
             }
+            let booked = places.begin();
             let list = self.list(gpu, listed)?;
             film.add_splats(count, list.into_iter().map(Splat::from));
             *rays += RayCounts {
@@ -157,6 +159,7 @@ impl Photons {
                 mixed_shadow: mixed_shadow.into(),
                 ..RayCounts::default()
             };
+            places.end(Place::Photons, booked);
             first += count;
             let secs = begin.elapsed().as_secs_f64();
             let room = u64::from(LARGEST_BATCH) * count / u64::from(2 * listed.max(1));
@@ -171,10 +174,15 @@ impl Photons {
     }
 
     /// The counters after a batch.
-    fn run(&self, gpu: &GpuDevice, batch: &PhotonBatch) -> Result<[u32; 3], GpuError> {
-        let queue = &gpu.queue;
-        queue.write_buffer(&self.batch, 0, bytemuck::bytes_of(batch));
-        queue.write_buffer(&self.counters, 0, &[0; COUNTERS_BYTES as usize]);
+    fn run(
+        &self,
+        gpu: &GpuDevice,
+        batch: &PhotonBatch,
+        places: &mut Places,
+    ) -> Result<[u32; 3], GpuError> {
+        let begun = places.begin();
+        gpu.write(&self.batch, 0, bytemuck::bytes_of(batch));
+        gpu.write(&self.counters, 0, &[0; COUNTERS_BYTES as usize]);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -182,9 +190,10 @@ impl Photons {
             pass.dispatch_workgroups(batch.count.div_ceil(WORKGROUP), 1, 1);
         }
         encoder.copy_buffer_to_buffer(&self.counters, 0, &self.staging, 0, COUNTERS_BYTES);
-        queue.submit([encoder.finish()]);
-        gpu.check()?;
+        gpu.submit(encoder, 1)?;
+        let begun = places.end(Place::Record, begun);
         let bytes = gpu.read(&self.staging, COUNTERS_BYTES)?;
+        places.end(Place::Wait, begun);
         Ok(bytemuck::pod_read_unaligned(&bytes))
     }
 
@@ -195,8 +204,7 @@ impl Photons {
         }
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(&self.splats, 0, &self.staging, 0, bytes);
-        gpu.queue.submit([encoder.finish()]);
-        gpu.check()?;
+        gpu.submit(encoder, 0)?;
         Ok(bytemuck::pod_collect_to_vec(
             &gpu.read(&self.staging, bytes)?,
         ))

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::kernel::{BindGroups, Kernel};
-use super::lanes::{Batch, Beside, Counters, Gathered, Lanes, most_lanes, state_parts};
+use super::lanes::{Batch, Beside, Counters, Lanes, most_lanes, state_parts};
 use super::pacer::Pacer;
 use super::photons::Photons;
 use super::profile::{
@@ -19,7 +19,7 @@ use crate::film::Film;
 use crate::packed::PackedScene;
 use crate::shared::WORKGROUP;
 use crate::work::list::TILE_PLACES;
-use crate::work::{Pass, PhotonWork, PixelWork, RayCounts, Watcher, WorkList};
+use crate::work::{Pass, PhotonWork, PixelWork, Place, Places, RayCounts, Watcher, WorkList};
 
 /// Samples of one pixel in a batch at most, so that a batch has pixels enough to sum in parallel.
 const MOST_SAMPLES: u32 = 256;
@@ -45,6 +45,7 @@ pub struct GpuBackend {
     /// The first submission compiles the kernels, and says nothing about speed.
     warm: bool,
     profiler: Option<Profiler>,
+    places: Places,
     batches_until_loss: Option<u32>,
     /// The kernels hold no more than the scene needs.
     specialised: bool,
@@ -181,6 +182,7 @@ impl GpuBackend {
             pacer,
             warm: false,
             profiler: None,
+            places: Places::default(),
             batches_until_loss: None,
             specialised: true,
         })
@@ -207,6 +209,16 @@ impl GpuBackend {
         self.profiler.as_ref().map(|profiler| profiler.seconds)
     }
 
+    /// Books the host's time from now on.
+    pub fn set_places(&mut self, places: Places) {
+        self.places = places;
+    }
+
+    /// Where the host's time went.
+    pub fn places(&self) -> &Places {
+        &self.places
+    }
+
     /// For tests: the device is destroyed before its n-th batch from now.
     #[doc(hidden)]
     pub fn lose_device_after(&mut self, batches: u32) {
@@ -226,17 +238,20 @@ impl GpuBackend {
         rays: &mut RayCounts,
         watcher: &Watcher<'_>,
     ) -> Result<(), GpuError> {
+        let begun = self.places.begin();
         // Pixels that share a batch take equally many samples of it: no lanes stay empty. Those of a sharing tile lie together.
         let mut pixels = work.pixels.clone();
-        let tile = |work: &PixelWork| tile_of(film.width, work.pixel);
-        pixels.sort_by_key(|work| (Reverse(work.samples()), tile(work), work.pixel));
-        for members in pixels.chunk_by_mut(|a, b| a.samples() == b.samples() && tile(a) == tile(b))
-        {
+        for work in &mut pixels {
+            work.tile = tile_of(film.width, work.pixel);
+        }
+        pixels.sort_unstable_by_key(|work| (Reverse(work.samples()), work.tile, work.pixel));
+        for members in pixels.chunk_by_mut(|a, b| a.samples() == b.samples() && a.tile == b.tile) {
             let count = members.len() as u32;
             for (place, work) in (0..).zip(members) {
                 work.tile = place + TILE_PLACES * count;
             }
         }
+        self.places.end(Place::List, begun);
         let mut rest = pixels.as_slice();
         while !rest.is_empty() && !watcher.is_cancelled() {
             let lanes = self.pacer.lanes();
@@ -270,7 +285,7 @@ impl GpuBackend {
                 &self.scene,
             )?),
         };
-        photons.render(&self.gpu, film, work, rays, watcher)
+        photons.render(&self.gpu, film, work, rays, &mut self.places, watcher)
     }
 
     /// Makes room for `wanted` lanes, or for as many as there is memory for; returns how many may be used.
@@ -282,7 +297,8 @@ impl GpuBackend {
         if present >= wanted {
             return Ok(wanted);
         }
-        match Lanes::new(&self.gpu, wanted, &self.state_parts, beside) {
+        let room = self.pacer.room(wanted);
+        match Lanes::new(&self.gpu, room, &self.state_parts, beside) {
             Ok(lanes) => {
                 self.bind(&lanes)?;
                 self.lanes = Some(lanes);
@@ -333,7 +349,17 @@ impl GpuBackend {
         work: &[PixelWork],
         at_once: u32,
     ) -> Result<RayCounts, GpuError> {
-        lanes.upload(&self.gpu, work, &Gathered::of(film, work));
+        let begun = self.places.begin();
+        lanes.upload_work(&self.gpu, work);
+        let begun = self.places.end(Place::List, begun);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let is_empty = |work: &PixelWork| film.pixels[work.pixel as usize].is_empty();
+        if work.iter().all(is_empty) {
+            lanes.clear_sums(&mut encoder, work.len());
+        } else {
+            lanes.upload_sums(&self.gpu, film, work);
+        }
+        self.places.end(Place::Sums, begun);
 
         let longest = work.iter().map(PixelWork::samples).max().unwrap_or(0);
         let real_pass = pass == Pass::Real;
@@ -351,21 +377,27 @@ impl GpuBackend {
                 with_groups: u32::from(lanes.beside.groups && !real_pass),
                 ..Batch::default()
             };
-            self.run_batch(lanes, &batch)?;
+            self.run_batch(lanes, &batch, encoder)?;
+            encoder = self.gpu.device.create_command_encoder(&Default::default());
             sample_offset += sample_count;
-            let counters =
-                self.finish_batch(lanes, &batch, film, work, sample_offset == longest)?;
+            let last = sample_offset == longest;
+            let counters = self.finish_batch(lanes, &batch, film, work, last)?;
             rays += counters.rays;
         }
         Ok(rays)
     }
 
-    /// Takes every sample of the batch to its end.
-    fn run_batch(&mut self, lanes: &Lanes, batch: &Batch) -> Result<(), GpuError> {
+    /// Takes every sample of the batch to its end; `encoder` has what comes before.
+    fn run_batch(
+        &mut self,
+        lanes: &Lanes,
+        batch: &Batch,
+        mut encoder: wgpu::CommandEncoder,
+    ) -> Result<(), GpuError> {
         self.count_down_to_loss();
-        let queue = &self.gpu.queue;
-        queue.write_buffer(&lanes.batch, 0, bytemuck::bytes_of(batch));
-        lanes.clear_counters(&self.gpu);
+        let mut begun = self.places.begin();
+        self.gpu.write(&lanes.batch, 0, bytemuck::bytes_of(batch));
+        lanes.clear_counters(&mut encoder);
 
         // The first queue is written with parity 1, so that parity 0 reads it.
         let mut parity = 0;
@@ -390,11 +422,13 @@ impl GpuBackend {
                 parity = 1 - parity;
             }
             let start = Instant::now();
-            let mut encoder = self.encode(lanes, &dispatches);
+            self.encode(&mut encoder, lanes, &dispatches);
             lanes.copy_counters(&mut encoder);
-            self.submit(encoder)?;
+            self.gpu.submit(encoder, dispatches.len() as u64)?;
+            begun = self.places.end(Place::Record, begun);
             let counters = lanes.read_counters(&self.gpu)?;
             self.take_times()?;
+            begun = self.places.end(Place::Wait, begun);
             if self.warm {
                 let begun = if steps == 0 { batch.lane_count } else { 0 };
                 let done = u64::from(begun) + u64::from(counters.steps - steps_before);
@@ -411,6 +445,7 @@ impl GpuBackend {
                 return Err(GpuError::Endless(steps));
             }
             dispatches.clear();
+            encoder = self.gpu.device.create_command_encoder(&Default::default());
         }
     }
 
@@ -432,24 +467,35 @@ impl GpuBackend {
         if self.features.sharing && batch.real_pass == 0 {
             dispatches.insert(0, once(SHARE, batch.lane_count));
         }
-        let mut encoder = self.encode(lanes, &dispatches);
+        let begun = self.places.begin();
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        self.encode(&mut encoder, lanes, &dispatches);
         lanes.copy_counters(&mut encoder);
+        if last {
+            lanes.copy_sums(&mut encoder, work.len());
+        }
+        self.gpu.submit(encoder, dispatches.len() as u64)?;
+        let begun = self.places.end(Place::Record, begun);
         if !last {
-            self.submit(encoder)?;
             let counters = lanes.read_counters(&self.gpu)?;
             self.take_times()?;
+            self.places.end(Place::Wait, begun);
             return Ok(counters);
         }
-        lanes.copy_sums(&mut encoder, work.len());
-        self.submit(encoder)?;
-        let (counters, gathered) = lanes.read_sums(&self.gpu, work.len())?;
+        lanes.wait_for_sums(&self.gpu, work.len())?;
+        let begun = self.places.end(Place::Wait, begun);
+        let counters = lanes.read_sums(&self.gpu, film, work)?;
         self.take_times()?;
-        gathered.scatter(film, work);
+        self.places.end(Place::Sums, begun);
         Ok(counters)
     }
 
-    fn encode(&mut self, lanes: &Lanes, dispatches: &[Dispatch]) -> wgpu::CommandEncoder {
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+    fn encode(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        lanes: &Lanes,
+        dispatches: &[Dispatch],
+    ) {
         let kernels = &self.kernels;
         let groups = &self.groups;
         let run = |pass: &mut wgpu::ComputePass<'_>, dispatch: &Dispatch| {
@@ -474,15 +520,9 @@ impl GpuBackend {
                     });
                     run(&mut pass, dispatch);
                 }
-                profiler.resolve(&mut encoder);
+                profiler.resolve(encoder);
             }
         }
-        encoder
-    }
-
-    fn submit(&self, encoder: wgpu::CommandEncoder) -> Result<(), GpuError> {
-        self.gpu.queue.submit([encoder.finish()]);
-        self.gpu.check()
     }
 
     fn take_times(&mut self) -> Result<(), GpuError> {

@@ -14,7 +14,9 @@ use crate::gpu::GpuError;
 use crate::pack::PackError;
 use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
 use crate::scene::{Composite, Scene};
-use crate::work::{Meter, Phase, PhotonWork, Progress, RayCounts, Watcher, WorkList};
+use crate::work::{
+    Meter, Phase, PhotonWork, Place, Places, Progress, RayCounts, Watcher, WorkList,
+};
 
 pub(super) struct Core {
     pub scene: Scene,
@@ -26,6 +28,8 @@ pub(super) struct Core {
     pub options: RendererOptions,
     pub rays: RayCounts,
     pub seconds: Seconds,
+    /// What a frame takes beside the device's backend, which has its own.
+    pub places: Places,
     /// Things the user should hear: fallbacks taken, values fitted.
     pub notes: Vec<String>,
     /// Of a draft: other exposures and cameras make do with it.
@@ -34,6 +38,8 @@ pub(super) struct Core {
     pub backdrop_share: Option<f64>,
     /// The picture's time.
     pub time_secs: f64,
+    /// What a ray in every pixel took the last time.
+    pub secs_per_ray: Option<f64>,
 }
 
 impl Core {
@@ -45,30 +51,39 @@ impl Core {
 
     /// The same, anchored at a point of the world.
     pub fn pack_at(&mut self, anchor: DVec3, watcher: &Watcher<'_>) -> Result<(), PackError> {
+        let begun = self.places.begin();
         self.packed = packed(&self.scene, anchor, &self.options, watcher)?;
+        self.places.end(Place::Trees, begun);
         Ok(())
     }
 
     /// Packs the virtual world anew.
     pub fn pack_virtual(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
         let meter = Meter::begin(watcher, Phase::Trees, 1);
+        let begun = self.places.begin();
         self.packed.rebuild_virtual(&self.scene)?;
+        self.places.end(Place::Trees, begun);
         meter.end();
         Ok(())
     }
 
     /// Packs the virtual world anew after an object was moved.
     pub fn pack_moved(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
-        match self.options.draft {
-            true => self.packed.move_virtual(&self.scene),
-            false => self.pack_virtual(watcher),
+        if !self.options.draft {
+            return self.pack_virtual(watcher);
         }
+        let begun = self.places.begin();
+        self.packed.move_virtual(&self.scene)?;
+        self.places.end(Place::Trees, begun);
+        Ok(())
     }
 
     /// Packs anew what moves.
     pub fn pack_moving(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
         let meter = Meter::begin(watcher, Phase::Trees, 1);
+        let begun = self.places.begin();
         self.packed.rebuild_moving(&self.scene)?;
+        self.places.end(Place::Trees, begun);
         meter.end();
         Ok(())
     }
@@ -138,16 +153,22 @@ impl Core {
     }
 
     /// The samples of the main pass that lie before `end_of_row`, in rays per pixel.
-    pub fn main_work(&self, end_of_row: impl Fn(usize) -> u32 + Sync) -> WorkList {
-        WorkList::main(&self.packed.pixels, &self.film, end_of_row)
+    pub fn main_work(&mut self, end_of_row: impl Fn(usize) -> u32 + Sync) -> WorkList {
+        let begun = self.places.begin();
+        let work = WorkList::main(&self.packed.pixels, &self.film, end_of_row);
+        self.places.end(Place::List, begun);
+        work
     }
 
     /// The real samples before `end_of_row` that the composite, or a plane, lacks.
-    pub fn real_work(&self, end_of_row: impl Fn(usize) -> u32 + Sync) -> WorkList {
+    pub fn real_work(&mut self, end_of_row: impl Fn(usize) -> u32 + Sync) -> WorkList {
+        let begun = self.places.begin();
         let everywhere = self.options.real_everywhere
             || self.scene.settings.composite == Composite::Quotient
             || self.options.without.contains(Skip::EdgeReal);
-        WorkList::real(&self.packed.pixels, &self.film, everywhere, end_of_row)
+        let work = WorkList::real(&self.packed.pixels, &self.film, everywhere, end_of_row);
+        self.places.end(Place::List, begun);
+        work
     }
 
     /// True if no pixel is within reach of anything virtual: the picture is the photograph.
@@ -201,7 +222,8 @@ pub(super) struct Way<'a> {
 
 impl<'a> Way<'a> {
     /// From where the film stands to `end`, in rays per pixel.
-    pub fn to(end: u32, core: &Core, watcher: &Watcher<'a>) -> Self {
+    pub fn to(end: u32, core: &mut Core, watcher: &Watcher<'a>) -> Self {
+        let begun = core.places.begin();
         let (mut taken, mut wanted) = (0, 0);
         let samples_total = end - core.film.first_sample;
         for (sums, info) in core.film.pixels.iter().zip(&core.packed.pixels) {
@@ -210,12 +232,14 @@ impl<'a> Way<'a> {
                 wanted += u64::from(samples_total) * u64::from(sums.sample_factor.max(1));
             }
         }
+        let samples = core.samples().unwrap_or(samples_total);
+        core.places.end(Place::List, begun);
         Self {
             watcher: *watcher,
             begin: Instant::now(),
             taken,
             wanted,
-            samples: core.samples().unwrap_or(samples_total),
+            samples,
             samples_total,
         }
     }

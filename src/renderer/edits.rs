@@ -27,7 +27,7 @@ impl Renderer {
         self.core.packed.frame.seed = seed;
         self.core.film.first_sample = 0;
         self.end_sample = rays_per_pixel;
-        self.restart(false, Changed::View, watcher)
+        self.restart(false, Changed::Plan, watcher)
     }
 
     /// Another lens. Nothing is rebuilt but the pilot; the film starts anew.
@@ -37,7 +37,7 @@ impl Renderer {
     pub fn set_lens(&mut self, lens: Lens, watcher: &Watcher<'_>) -> Result<(), RenderError> {
         self.core.scene.lens = lens;
         self.core.packed.set_camera(&self.core.scene);
-        self.restart(false, Changed::View, watcher)
+        self.restart(false, Changed::Plan, watcher)
     }
 
     /// Another camera pose. While it stays near the anchor nothing is rebuilt but the pilot.

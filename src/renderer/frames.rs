@@ -50,6 +50,10 @@ impl Renderer {
             let scale = f64::from(core.packed.frame.exposure_scale);
             core.scene.settings.exposure = Exposure::Ev(scale.log2());
         }
+        let seen = match &edit.photo {
+            Some(_) => Changed::Photo,
+            None => Changed::View,
+        };
         if let Some(photo) = edit.photo {
             core.scene.photo = Some(photo);
         }
@@ -95,7 +99,7 @@ impl Renderer {
             core.pack_moving(watcher)?;
             return self.restart(true, Changed::Moving, watcher);
         }
-        self.restart(true, Changed::View, watcher)
+        self.restart(true, seen, watcher)
     }
 
     /// The camera or an object moves while the shutter is open.

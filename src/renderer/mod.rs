@@ -57,15 +57,16 @@ pub use shown::Delivered;
 pub use skips::{Skip, Without};
 pub use stats::Stats;
 
-pub use crate::work::{Phase, Progress, RayCounts, Watcher};
+pub use crate::work::{Phase, Place, Places, Progress, RayCounts, Spent, Watcher};
 
 use self::core::Core;
 use backend::Backend;
 use moving::Moving;
 use stopwatch::Stopwatch;
 
+use crate::clock::HostThreads;
 use crate::film::{Film, RealSurface};
-use crate::gpu::{GpuDevice, KernelSeconds};
+use crate::gpu::{GpuDevice, KernelSeconds, Traffic};
 use crate::packed::PackedScene;
 use crate::scene::{Choice, Combine, Scene, Settings};
 
@@ -233,9 +234,11 @@ impl Renderer {
                 options,
                 rays: RayCounts::default(),
                 seconds: Seconds::default(),
+                places: Places::default(),
                 notes: Vec::new(),
                 photo_light: None,
                 backdrop_share: None,
+                secs_per_ray: None,
             },
             driver: Driver::Still,
             end_sample,
@@ -350,6 +353,29 @@ impl Renderer {
     /// Seconds by kernel since [`Renderer::profile_gpu`].
     pub fn gpu_kernel_seconds(&self) -> Option<KernelSeconds> {
         self.core.backend.gpu()?.kernel_seconds()
+    }
+
+    /// Books the host's work anew from now on, with what the processors spend on it.
+    pub fn count_places(&mut self) {
+        let places = Places::counting(HostThreads::here().map(Arc::new));
+        if let Some(gpu) = self.core.backend.gpu_mut() {
+            gpu.set_places(places.clone());
+        }
+        self.core.places = places;
+    }
+
+    /// Where the host's time went since the renderer was made, or since [`Renderer::count_places`].
+    pub fn places(&self) -> Places {
+        let mut places = self.core.places.clone();
+        if let Some(gpu) = self.core.backend.gpu() {
+            places.add(gpu.places());
+        }
+        places
+    }
+
+    /// What went to the graphics device and back, if one renders.
+    pub fn gpu_traffic(&self) -> Option<Traffic> {
+        Some(self.gpu_device()?.traffic())
     }
 
     /// "cpu" or "gpu".

@@ -5,11 +5,10 @@ use super::core::Core;
 use super::stopwatch::Stopwatch;
 use super::{RenderError, Renderer, photo_albedo};
 use crate::cpu::{self, LensGrid};
-use crate::film::Film;
 use crate::gpu::Changed;
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Scene};
-use crate::work::{Meter, Phase, Watcher};
+use crate::work::{Meter, Phase, Place, Watcher};
 
 /// Share of the proxy's pixels above which a limited albedo is told.
 const MOSTLY: f64 = 0.5;
@@ -39,17 +38,21 @@ impl Renderer {
         let look_ahead = self.core.seconds.look_ahead;
         if real_light_changed {
             self.surfaces.clear();
+            let begun = self.core.places.begin();
             self.prepare_photo(watcher);
+            self.core.places.end(Place::Photo, begun);
         }
         let swept = self.prepare_shutter(watcher)?;
         self.keep_lens_grid();
         self.look_ahead(watcher);
         let core = &mut self.core;
         let changed = match changed {
-            Changed::View if swept => Changed::Moving,
+            changed if swept => changed.max(Changed::Moving),
             changed => changed,
         };
+        let begun = core.places.begin();
         core.backend.update(&core.packed, changed)?;
+        core.places.end(Place::Upload, begun);
         core.seconds.build += stopwatch.secs() - (core.seconds.look_ahead - look_ahead);
         self.open_backend(watcher)
     }
@@ -161,9 +164,12 @@ impl Renderer {
         let core = &mut self.core;
         let without = core.options.without;
         without.apply_to_frame(&mut core.packed.frame);
+        let begun = core.places.begin();
         core.packed.set_backdrop(&core.scene);
+        let begun = core.places.end(Place::Backdrop, begun);
         cpu::pilot(&mut core.packed, core.lens_grid.as_ref(), &meter);
         without.apply_to_pixels(&mut core.packed.pixels);
+        let begun = core.places.end(Place::Pilot, begun);
         let photons = core.packed.photons_per_ray > 0;
         let note = core.packed.black_shadows(photons);
         core.notes
@@ -172,17 +178,17 @@ impl Renderer {
             true => None,
             false => cpu::backdrop_share(&mut core.packed),
         };
-        core.film = Film::new(
-            core.film.width,
-            core.film.height,
-            core.film.first_sample,
-            core.options.guides,
-        );
+        let begun = core.places.end(Place::Backdrop, begun);
+        // Of a film that no ray was traced for, memory is not committed.
+        if core.rays.traced() > 0 {
+            core.film.renew();
+        }
         let factors = core.packed.pixels.iter().map(|p| p.sample_factor);
         core.film.set_sample_factors(factors);
         let grouped = core.options.keeps_groups(core.scene.settings.combine);
         core.film.set_groups(grouped);
         core.film.set_photons(core.packed.photons_per_ray > 0);
+        core.places.end(Place::Film, begun);
         match (core.options.filter, core.options.draft) {
             (None, _) => {}
             (Some(_), false) => self.surfaces = cpu::diffuse_surfaces(&core.packed),

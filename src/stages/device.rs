@@ -61,9 +61,7 @@ impl GpuStages {
     /// An array with these contents; never empty, for a binding must not be.
     pub(super) fn array(&self, what: &str, contents: &[f32]) -> Result<wgpu::Buffer, GpuError> {
         let buffer = self.room(what, contents.len())?;
-        self.gpu
-            .queue
-            .write_buffer(&buffer, 0, bytemuck::cast_slice(contents));
+        self.gpu.write(&buffer, 0, bytemuck::cast_slice(contents));
         Ok(buffer)
     }
 
@@ -101,9 +99,7 @@ impl GpuStages {
             usage: Usage::UNIFORM | Usage::COPY_DST,
             mapped_at_creation: false,
         });
-        self.gpu
-            .queue
-            .write_buffer(&buffer, 0, bytemuck::bytes_of(params));
+        self.gpu.write(&buffer, 0, bytemuck::bytes_of(params));
         buffer
     }
 

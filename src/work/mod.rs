@@ -3,10 +3,12 @@
 
 pub(crate) mod list;
 mod photons;
+mod places;
 pub(crate) mod rays;
 mod watcher;
 
 pub use list::{Pass, PixelWork, WorkList};
 pub use photons::PhotonWork;
+pub use places::{Begun, Place, Places, Spent};
 pub use rays::{RayCounts, SampleRays};
 pub use watcher::{Meter, Phase, Progress, Watcher};

@@ -129,6 +129,13 @@ impl<'a> Watcher<'a> {
             || self.deadline.is_some_and(|at| Instant::now() >= at)
     }
 
+    /// Until the deadline; without one without end.
+    pub fn secs_left(&self) -> f64 {
+        self.deadline.map_or(f64::INFINITY, |at| {
+            at.saturating_duration_since(Instant::now()).as_secs_f64()
+        })
+    }
+
     pub fn hear(&self, progress: &Progress) {
         if let Some(heard) = self.heard {
             heard(progress);

@@ -5,6 +5,7 @@ mod docs;
 mod files;
 mod flags;
 mod gpu_code;
+mod gpu_frame;
 mod gpu_time;
 mod growth;
 mod paper;
@@ -39,6 +40,7 @@ enum Measurement {
     PaperTable(paper::Arguments),
     Stress(stress::Arguments),
     GpuTime(gpu_time::Arguments),
+    GpuFrame(gpu_frame::Arguments),
     GpuCode(gpu_code::Arguments),
 }
 
@@ -85,6 +87,7 @@ pub(super) fn run(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Measurement::PaperTable(arguments)) => paper::run(&arguments),
         Some(Measurement::Stress(arguments)) => stress::run(&arguments),
         Some(Measurement::GpuTime(arguments)) => gpu_time::run(&arguments),
+        Some(Measurement::GpuFrame(arguments)) => gpu_frame::run(&arguments),
         Some(Measurement::GpuCode(arguments)) => gpu_code::run(&arguments),
     }
 }

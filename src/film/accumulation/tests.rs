@@ -57,6 +57,18 @@ fn worst_ulp(a: &[f32], b: &[f32]) -> u32 {
 }
 
 #[test]
+fn a_renewed_film_is_a_new_one() {
+    let mut film = render(0..4);
+    let new = Film::new(3, 1, 0, true);
+    assert_ne!(film, new, "control");
+    film.set_groups(true);
+    film.set_sample_factors([2, 3, 4].into_iter());
+    film.renew();
+    film.set_groups(false);
+    assert_eq!(film, new);
+}
+
+#[test]
 fn ranges_merged_equal_one_run_within_2_ulp() {
     let whole = render(0..20_000);
     for cuts in [vec![0, 1, 20_000], vec![0, 7_001, 13_333, 20_000]] {

@@ -1,0 +1,59 @@
+//! What goes to a device and back.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use serde::Serialize;
+
+/// Since the device was opened, or between two such counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Traffic {
+    pub bytes_up: u64,
+    pub bytes_down: u64,
+    pub submissions: u64,
+    /// Of the estimator's kernels.
+    pub dispatches: u64,
+    /// How often the host waited for the device.
+    pub waits: u64,
+}
+
+impl std::ops::Sub for Traffic {
+    type Output = Self;
+
+    fn sub(self, before: Self) -> Self {
+        Self {
+            bytes_up: self.bytes_up - before.bytes_up,
+            bytes_down: self.bytes_down - before.bytes_down,
+            submissions: self.submissions - before.submissions,
+            dispatches: self.dispatches - before.dispatches,
+            waits: self.waits - before.waits,
+        }
+    }
+}
+
+/// Counts from any thread.
+#[derive(Debug, Default)]
+pub(super) struct TrafficCounter {
+    pub bytes_up: AtomicU64,
+    pub bytes_down: AtomicU64,
+    pub submissions: AtomicU64,
+    pub dispatches: AtomicU64,
+    pub waits: AtomicU64,
+}
+
+impl TrafficCounter {
+    pub fn counts(&self) -> Traffic {
+        let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        Traffic {
+            bytes_up: of(&self.bytes_up),
+            bytes_down: of(&self.bytes_down),
+            submissions: of(&self.submissions),
+            dispatches: of(&self.dispatches),
+            waits: of(&self.waits),
+        }
+    }
+}
+
+/// One more count.
+pub(super) fn count(counter: &AtomicU64, more: u64) {
+    counter.fetch_add(more, Ordering::Relaxed);
+}
