@@ -7,7 +7,7 @@ use std::path::Path;
 
 use glam::{DMat4, DVec3};
 use mixray::film::Picture;
-use mixray::renderer::{Budget, FrameEdit, PreviousView, Renderer, RendererOptions, Watcher};
+use mixray::renderer::{Budget, FrameEdit, NeighbourView, Renderer, RendererOptions, Watcher};
 use mixray::scene::trajectory::CameraPath;
 use mixray::scene::{MotionBlurMethod, MotionBlurSettings, Scene, Shutter};
 use mixray::stages::finish;
@@ -114,7 +114,7 @@ fn errors(motion: Motion, aperture_radius_m: f64) -> Result<[f64; 3]> {
     });
     // The motion since the frame before is that of the exposure, where the shutter is open for all of the frame's time.
     let renderer = renderer(&scene, &path, 0)?;
-    let moved = renderer.picture_motion(&PreviousView {
+    let moved = renderer.picture_motion(&NeighbourView {
         world_from_camera: motion(-1.0),
         time_secs: -EXPOSURE_SECS,
     });

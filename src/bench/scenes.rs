@@ -19,6 +19,7 @@ pub(super) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -
         stages: Stages::default(),
         allowed: Vec::new(),
         focal_length_mm: None,
+        photo_file: None,
         photo: None,
         camera,
         lens: Lens {

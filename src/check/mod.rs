@@ -8,6 +8,7 @@ mod standing;
 
 use std::fmt;
 
+use crate::distortion::LENS_FISHEYE;
 use crate::scene::check::Check;
 use crate::scene::{Choice, Exposure, Scene};
 
@@ -15,6 +16,8 @@ use crate::scene::{Choice, Exposure, Scene};
 const LARGE_EV: f64 = 1.0;
 /// The same downwards where the proxy's albedo comes from the photograph, which may be dark: "auto" takes 0.5 for it.
 const DARK_EV: f64 = 3.0;
+/// How many times another focal length is longer or shorter: cameras round theirs, and count it by diagonal or by width.
+const OTHER_FOCAL_LENGTH: f64 = 1.1;
 
 /// One warning.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -83,6 +86,29 @@ pub fn exposure(scene: &Scene, fitted_ev: Option<f64>) -> Option<Finding> {
         off.abs()
     );
     Some(Finding::new(Check::Exposure, finding))
+}
+
+/// That the camera does not see as the one that took the photograph did; `noted_px` is what that one notes of its focal length.
+pub fn focal_length(scene: &Scene, noted_px: Option<f64>) -> Option<Finding> {
+    let camera = &scene.camera;
+    let noted_px = noted_px.filter(|_| camera.distortion.model != LENS_FISHEYE)?;
+    let has_px = (camera.fx * camera.fy).sqrt();
+    let off = has_px / noted_px;
+    if (1.0 / OTHER_FOCAL_LENGTH..=OTHER_FOCAL_LENGTH).contains(&off)
+        || scene.allowed.contains(&Check::FocalLength)
+    {
+        return None;
+    }
+    let fov_deg = |focal_px: f64| {
+        let half = f64::from(camera.height) / (2.0 * focal_px);
+        (2.0 * half.atan()).to_degrees()
+    };
+    let finding = format!(
+        "the photograph's camera notes a focal length of {noted_px:.0} pixels, the scene has {has_px:.0}: set vertical_fov_deg = {:.1} in [camera], which is {:.1} now",
+        fov_deg(noted_px),
+        fov_deg(has_px)
+    );
+    Some(Finding::new(Check::FocalLength, finding))
 }
 
 /// A length for people, metres.

@@ -8,6 +8,7 @@ use super::scene_flags::SceneFlags;
 use super::{Failure, Outcome, print, say};
 use crate::check::{self, Extent};
 use crate::renderer::roughly_fitted_exposure_ev;
+use crate::scene::Scene;
 
 /// Reads a scene and tells what in it can hardly be meant, a line each, and how to mend it
 ///
@@ -26,6 +27,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         say("note", warning);
     }
     let mut findings = check::scene(&scene, Extent::Still);
+    findings.extend(check::focal_length(&scene, noted_focal_px(&scene)));
     findings.extend(check::exposure(&scene, roughly_fitted_exposure_ev(&scene)?));
     let text: String = (findings.iter())
         .map(|finding| format!("{finding}\n"))
@@ -36,4 +38,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     print("nothing to tell\n")?;
     Ok(Outcome::Done)
+}
+
+/// What the photograph's camera notes of its focal length.
+#[cfg(feature = "start")]
+pub(super) fn noted_focal_px(scene: &Scene) -> Option<f64> {
+    let photo = scene.photo.as_ref()?;
+    crate::start::focal_px_of_whole(scene.photo_file.as_ref()?, (photo.width, photo.height))
+}
+
+/// Nobody who reads it is built in.
+#[cfg(not(feature = "start"))]
+pub(super) fn noted_focal_px(_: &Scene) -> Option<f64> {
+    None
 }

@@ -23,7 +23,7 @@ pub(super) struct FrameFlags {
     /// Pictures of a folder [default: png; in a pattern its own]
     #[arg(long, value_name = "FORMAT", value_parser = format)]
     format: Option<Format>,
-    /// Layers of EXR frames, as those of `mixray render`
+    /// Layers of EXR frames, as those of `mixray render`, and motion
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     layers: Vec<ExrLayer>,
     /// Only the frames with these numbers, FROM to TO - 1

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 
+use super::progress::Bar;
 use super::scene_flags::SceneFlags;
 use super::{Failure, Outcome, print, say};
 use crate::files;
@@ -12,7 +13,7 @@ use crate::light_fit::{
     FitOptions, Fitted, Gain, LightFit, ScaleBasis, edited, fit, residual_picture,
 };
 use crate::output::{Format, PngBits, Target, check_writable_as, write_image, write_text};
-use crate::work::Watcher;
+use crate::work::{Progress, Watcher};
 
 /// Fits the light of a scene to its photograph
 #[derive(Debug, Args)]
@@ -95,7 +96,11 @@ fn run_fit(arguments: &Fit) -> Result<Outcome, Failure> {
         keep_rotation: arguments.keep_rotation,
     };
     let named = |problem: &dyn std::fmt::Display| Failure(format!("{}: {problem}", path.display()));
-    let fit = fit(&scene, options, &Watcher::none()).map_err(|problem| named(&problem))?;
+    let bar = Bar::new("building trees", "");
+    let hear = |progress: &Progress| bar.hear(progress);
+    let fit = fit(&scene, options, &Watcher::none().heard_by(&hear));
+    drop(bar);
+    let fit = fit.map_err(|problem| named(&problem))?;
     if let Some(target) = &residual {
         write_image(target, &residual_picture(&fit), PngBits::Eight)?;
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::progress::Bar;
-use super::render::write;
+use super::render::{refuse_motion, write};
 use super::scene_flags::SceneFlags;
 use super::summary::combination;
 use super::values::png_bits;
@@ -57,6 +57,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         .iter()
         .map(|path| Target::picture(path))
         .collect::<Result<Vec<_>, _>>()?;
+    refuse_motion(&arguments.layers)?;
     let mut parts = Vec::new();
     for path in &arguments.parts {
         let (film, note) = read_film(path)?;
@@ -80,7 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let hear = |progress: &Progress| bar.hear(progress);
     let layers = ExrLayers::new(&arguments.layers, scene.settings.composite);
     let is_exr = targets.iter().any(|target| target.format() == Format::Exr);
-    let renderer = Renderer::with_film(
+    let mut renderer = Renderer::with_film(
         scene,
         film,
         range.1,
@@ -91,7 +92,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     drop(bar);
     let complete = range == (0, total);
     let moved = write(
-        &renderer,
+        &mut renderer,
         &targets,
         &layers,
         arguments.png_bits,

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::check::noted_focal_px;
 use super::picture_flags::PictureFlags;
 use super::progress::{Bar, SCRAMBLES};
 use super::values::part;
@@ -19,7 +20,7 @@ use crate::renderer::{
     Budget, Delivered, Goal, Progress, Renderer, RendererOptions, Stats, Watcher,
 };
 use crate::scene::{MotionBlurMethod, Overrides};
-use crate::stages::{GpuStages, finish, finish_with_noise};
+use crate::stages::{GpuStages, finish, finish_in_layers};
 
 /// Renders a scene's virtual objects into its photograph
 ///
@@ -31,8 +32,8 @@ pub(super) struct Arguments {
     /// Picture to write, .png or .exr; may be given several times [default: the scene's folder name + .png]
     #[arg(short, long, value_name = "OUT")]
     output: Vec<PathBuf>,
-    /// Layers of .exr pictures, with commas between: composite, difference, virtual, change, ratio, noise, mask, depth, normal, variance,
-    /// samples, which are the default, and albedo, real, mixed. real and mixed ask for the real light everywhere, which may cost several times
+    /// Layers of .exr pictures, with commas between: composite, difference, virtual, change, ratio, sharpness, noise, mask, depth, normal, variance,
+    /// samples, which are the default, and albedo, real, mixed, cryptomatte. real and mixed ask for the real light everywhere, which may cost several times
     /// the rest; the quotient composite does anyhow, and has real by default
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     layers: Vec<ExrLayer>,
@@ -88,6 +89,7 @@ impl Arguments {
             let message = "--resume wants one output, the part's .exr (-o part.exr): pictures come from `mixray merge`";
             return Err(Failure(message.to_owned()));
         }
+        refuse_motion(&self.layers)?;
         let goal = self.flags.goal.goal(self.flags.rpp)?;
         Ok(Job {
             goal,
@@ -164,6 +166,8 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         bar.aside(|| say_idle(saving, reason));
     }
     let mut findings = check::scene(renderer.scene(), Extent::Still);
+    let noted_px = noted_focal_px(renderer.scene());
+    findings.extend(check::focal_length(renderer.scene(), noted_px));
     let fitted_ev = renderer.roughly_fitted_exposure_ev();
     findings.extend(check::exposure(renderer.scene(), fitted_ev));
     bar.aside(|| {
@@ -192,16 +196,17 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     }
 
     let start = Instant::now();
+    let film_range = job.range.map(|_| {
+        let first = renderer.film().first_sample;
+        (first, first + renderer.samples())
+    });
     let moved = write(
-        &renderer,
+        &mut renderer,
         &targets,
         &layers,
         job.flags.png_bits,
         job.frame,
-        job.range.map(|_| {
-            let first = renderer.film().first_sample;
-            (first, first + renderer.samples())
-        }),
+        film_range,
     )?;
     let write_secs = start.elapsed().as_secs_f64();
     let stats = Stats::new(&renderer, load_secs, write_secs);
@@ -243,7 +248,7 @@ fn is_kept(path: &Path, renderer: &Renderer, range: (u32, u32)) -> Result<bool, 
 
 /// `film_range`: EXR files keep the film's sums, which are of these rays per pixel. Gives [`Delivered::moved`].
 pub(super) fn write(
-    renderer: &Renderer,
+    renderer: &mut Renderer,
     targets: &[Target],
     layers: &ExrLayers,
     png_bits: Option<PngBits>,
@@ -251,14 +256,19 @@ pub(super) fn write(
     film_range: Option<(u32, u32)>,
 ) -> Result<Option<f64>, Failure> {
     let gpu = renderer.gpu_device().cloned().map(GpuStages::new);
+    let is_exr = targets.iter().any(|t| t.format() == Format::Exr);
+    let mattes = match is_exr && layers.need_mattes() {
+        true => Some(renderer.mattes()?),
+        false => None,
+    };
+    let renderer = &*renderer;
     let Delivered {
         picture,
         film: shown,
         moved,
     } = renderer.delivered();
-    let is_exr = targets.iter().any(|t| t.format() == Format::Exr);
-    let finish = match is_exr && layers.need_noise() {
-        true => finish_with_noise,
+    let finish = match is_exr && layers.need_stages() {
+        true => finish_in_layers,
         false => finish,
     };
     let finished = finish(
@@ -289,7 +299,10 @@ pub(super) fn write(
             }
             Format::Exr => {
                 let metadata = Metadata::of(renderer, renderer.scene().fingerprint());
-                let exr = ExrPicture::of(renderer, metadata, &shown, finished.clone(), layers);
+                let exr = ExrPicture {
+                    mattes: mattes.clone(),
+                    ..ExrPicture::of(renderer, metadata, &shown, finished.clone(), layers)
+                };
                 if let Some(range) = film_range {
                     let film = renderer.film();
                     let on_gpu = renderer.gpu_device().is_some();
@@ -303,6 +316,15 @@ pub(super) fn write(
         }
     }
     Ok(moved)
+}
+
+/// A still has no frames before and after.
+pub(super) fn refuse_motion(layers: &[ExrLayer]) -> Result<(), Failure> {
+    if layers.contains(&ExrLayer::Motion) {
+        let message = "--layers motion: a still moves to no next frame; expected it of frames with a trajectory; leave it out, or render with `mixray sequence`";
+        return Err(Failure(message.to_owned()));
+    }
+    Ok(())
 }
 
 /// Says that a saving was switched off in vain.

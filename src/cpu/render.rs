@@ -4,8 +4,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::batch::{Batch, run_alone};
-use super::estimator::{begin_sample, evaluation, is_without_turn};
+use super::estimator::{begin_sample, evaluation, is_without_turn, virtual_is_nearer};
 use super::in_flight::InFlight;
+use super::request::answer;
 use super::state::path_state;
 use super::tiles::{Tile, TileWork, tiles};
 use crate::film::{Film, Sample, group_add, guide_add, pixel_add_real};
@@ -120,6 +121,17 @@ pub fn render_first_hit(scene: &PackedScene, pixel: u32, index: u32) -> (Vec3, V
     begin_sample(scene, &mut st, pixel, index, true);
     run_alone(scene, &mut st);
     (st.result.radiance, st.first_hit.albedo)
+}
+
+/// The virtual triangle that a sample's camera ray shows, or NONE: one for each sample that counts in the film's M.
+pub fn first_virtual_triangle(scene: &PackedScene, pixel: u32, index: u32) -> u32 {
+    let mut st = path_state(pixel, index);
+    begin_sample(scene, &mut st, pixel, index, true);
+    answer(scene, &mut st);
+    match virtual_is_nearer(&st.hits) {
+        true => st.hits.in_virtual.triangle,
+        false => NONE,
+    }
 }
 
 #[cfg(test)]

@@ -45,6 +45,17 @@ struct Term {
     /// Over the spread of the surface's own texture there.
     inv_texture: f32,
     block: u16,
+    /// Of `a`.
+    material: u32,
+}
+
+/// What of the residuals is taken for independent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clusters {
+    /// Blocks of the photograph.
+    Blocks,
+    /// Materials: what the scene says wrongly of an albedo is wrong wherever it is seen.
+    Materials,
 }
 
 const KNOWN: u32 = u32::MAX;
@@ -80,6 +91,7 @@ impl Comparisons {
                 weight,
                 inv_texture: 1.0 / texture,
                 block: block as u16,
+                material: point.material,
             };
             if point.albedo.is_some() {
                 terms.push(term(KNOWN, point.log_shown(), 1.0, texture[a]));
@@ -171,14 +183,30 @@ impl Comparisons {
         (1.4826 * f64::from(*median)).max(LEAST_SIGMA)
     }
 
-    /// Residuals with the weights of iteratively reweighted least squares and their blocks, and what `slopes`, by parameter and point, make of
+    /// Residuals with the weights of iteratively reweighted least squares, by cluster, and what `slopes`, by parameter and point, make of
     /// them: all that a step of Gauss and Newton needs.
-    pub fn linearised(&self, log_light: &[f32], slopes: &[Vec<f32>], sigma: f64) -> Linearised {
+    pub fn linearised(
+        &self,
+        log_light: &[f32],
+        slopes: &[Vec<f32>],
+        sigma: f64,
+        clusters: Clusters,
+    ) -> Linearised {
         let n = slopes.len();
+        let cluster_of = |term: &Term| match clusters {
+            Clusters::Blocks => usize::from(term.block),
+            Clusters::Materials => term.material as usize,
+        };
+        let count = self
+            .terms
+            .iter()
+            .map(cluster_of)
+            .max()
+            .map_or(0, |last| last + 1);
         let inv = (1.0 / (sigma * sigma)) as f32;
         let mut sums = Linearised {
             normal: vec![0.0; n * n],
-            gradients: vec![vec![0.0; n]; BLOCK_COUNT],
+            gradients: vec![vec![0.0; n]; count],
         };
         let mut row = vec![0.0f64; n];
         for term in &self.terms {
@@ -191,7 +219,7 @@ impl Comparisons {
                     b => here - slope[b as usize],
                 }) * f64::from(term.inv_texture);
             }
-            let gradient = &mut sums.gradients[usize::from(term.block)];
+            let gradient = &mut sums.gradients[cluster_of(term)];
             for i in 0..n {
                 gradient[i] += weight * f64::from(r) * row[i];
                 for j in 0..n {

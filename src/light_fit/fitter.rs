@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::comparisons::{BLOCK_COUNT, Comparisons, Costs, Linearised};
+use super::comparisons::{Clusters, Comparisons, Costs, Linearised};
 use super::directions::ROTATIONS;
 use super::points::Grid;
 use super::rays::{Openness, sunlight};
@@ -20,6 +20,8 @@ const LEAST_ELEVATION: f32 = 0.08;
 const STRENGTHS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 /// Irradiance that no logarithm is taken below, of the mean.
 const DARKEST: f64 = 1e-4;
+/// Fewer do not tell their scatter.
+const LEAST_CLUSTERS: usize = 8;
 /// Half the steps of the slopes by direction and rotation, degrees.
 const SLOPE_STEP_DEG: f64 = 2.0;
 const DESCENT: Descent = Descent {
@@ -272,7 +274,8 @@ impl Fitter<'_> {
         }
     }
 
-    /// Standard deviations: the sandwich of White (1980), with blocks of the photograph for independent errors (Liang and Zeger 1986).
+    /// Standard deviations: the sandwich of White (1980), with blocks of the photograph for independent errors (Liang and Zeger 1986), or materials
+    /// where albedos are known and that is more.
     pub fn uncertainty(
         &self,
         (rotation_deg, turns): (f64, bool),
@@ -336,11 +339,17 @@ impl Fitter<'_> {
             }
         }
         let centre = log_light(rotation_deg, sun, scale);
-        let sums = self.comparisons.linearised(&centre, &slopes, self.sigma);
-        let sigmas = sandwich(&sums, names.len());
+        let sigmas = [Clusters::Blocks, Clusters::Materials].map(|clusters| {
+            if clusters == Clusters::Materials && !self.comparisons.are_absolute {
+                return None;
+            }
+            let sums = (self.comparisons).linearised(&centre, &slopes, self.sigma, clusters);
+            sandwich(&sums, names.len())
+        });
         let of = |wanted: Parameter| {
             let at = names.iter().position(|name| *name == wanted)?;
-            sigmas.as_ref().map(|sigmas| sigmas[at])
+            let told = sigmas.iter().flatten().map(|sigmas| sigmas[at]);
+            told.max_by(f64::total_cmp)
         };
         Uncertainty {
             log_scale: of(Parameter::LogScale),
@@ -372,8 +381,14 @@ pub struct Uncertainty {
     pub sun_deg: Option<f64>,
 }
 
-/// Standard deviations of the parameters; `None`: the comparisons do not tell them apart.
+/// Standard deviations of the parameters; `None`: the comparisons do not tell them apart, or are too few clusters.
 fn sandwich(sums: &Linearised, n: usize) -> Option<Vec<f64>> {
+    let has_terms = |gradient: &&Vec<f64>| gradient.iter().any(|value| *value != 0.0);
+    let count = sums.gradients.iter().filter(has_terms).count();
+    if count < LEAST_CLUSTERS {
+        return None;
+    }
+
     let normal = DMatrix::from_row_slice(n, n, &sums.normal);
     let inverse = normal.cholesky()?.inverse();
     let mut scatter = DMatrix::zeros(n, n);
@@ -381,7 +396,7 @@ fn sandwich(sums: &Linearised, n: usize) -> Option<Vec<f64>> {
         let gradient = DVector::from_column_slice(gradient);
         scatter += &gradient * gradient.transpose();
     }
-    let correction = BLOCK_COUNT as f64 / (BLOCK_COUNT - 1) as f64;
+    let correction = count as f64 / (count - 1) as f64;
     let covariance = &inverse * scatter * &inverse * correction;
     Some((0..n).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect())
 }
@@ -453,7 +468,8 @@ impl Descending for Strengthening<'_> {
             slopes.push(share(sun, scale * self.log_ratio.exp() as f32));
         }
         let comparisons = self.fitter.comparisons;
-        let sums = comparisons.linearised(&log_light, &slopes, self.fitter.sigma);
+        let sigma = self.fitter.sigma;
+        let sums = comparisons.linearised(&log_light, &slopes, sigma, Clusters::Blocks);
         let n = slopes.len();
         let right = (0..n).map(|i| sums.gradients.iter().map(|g| g[i]).sum::<f64>());
         (

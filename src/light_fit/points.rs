@@ -44,6 +44,8 @@ pub struct Point {
     pub shown: [f32; 3],
     /// Luminance of the albedo, where the scene tells it.
     pub albedo: Option<f32>,
+    /// Of the scene as it is packed.
+    pub material: u32,
 }
 
 /// The grid over the photograph.
@@ -204,6 +206,7 @@ fn see(scene: &PackedScene, at: [usize; 2], pitch_px: usize, pixels: &[[f32; 3]]
         normal,
         shown: mean(pixels),
         albedo: (!from_photo).then(|| luminance(surface.base_color)),
+        material: surface.material,
     });
     Seen {
         depth_m,

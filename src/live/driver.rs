@@ -13,7 +13,7 @@ use super::{LiveError, LiveEvent, LiveOptions};
 use crate::output::ExrLayers;
 use crate::pack::next_anchor;
 use crate::renderer::{
-    Budget, Filter, FrameEdit, PreviousView, Renderer, RendererOptions, Watcher,
+    Budget, Filter, FrameEdit, NeighbourView, Renderer, RendererOptions, Watcher,
 };
 use crate::scene::Composite;
 use crate::scene::trajectory::{CameraPath, FrameName, Intrinsics, read_intrinsics};
@@ -106,6 +106,7 @@ fn open_sink(
         path: &options.output,
         output,
         layers: ExrLayers::new(&[], Composite::Additive),
+        objects: Vec::new(),
         composite: Composite::Additive,
         fingerprint: hash.finish(),
         header: intake.header.clone(),
@@ -322,7 +323,7 @@ impl Live<'_> {
         let wants_motion = (renderer.scene().stages.motion_blur)
             .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);
         let motion = before.filter(|_| wants_motion).map(|(time_secs, pose)| {
-            renderer.picture_motion(&PreviousView {
+            renderer.picture_motion(&NeighbourView {
                 world_from_camera: pose,
                 time_secs,
             })
@@ -331,7 +332,7 @@ impl Live<'_> {
         let Finished {
             picture,
             notes: told,
-            noise: _,
+            added: _,
             seconds: of_stages,
         } = finish(
             picture,

@@ -11,6 +11,26 @@ pub(super) enum Precision {
     Half,
     /// All bits: the values are compared, summed, or taken from others of their size.
     Single,
+    /// 32 bits, in steps of 2^-18: 0.01 codes of 8 bits at black. Bits that show nothing are zeros, which compress.
+    Steps,
+    /// 32 bits, the last 13 of them zeros: an estimate has no more than three digits.
+    Digits,
+}
+
+/// Steps of [`Precision::Steps`] from 0 to 1.
+const STEPS: f32 = (1 << 18) as f32;
+
+impl Precision {
+    fn rounded(self, value: f32) -> f32 {
+        match self {
+            Self::Half | Self::Single => value,
+            Self::Steps => (value * STEPS).round() / STEPS,
+            Self::Digits => {
+                let bits = value.to_bits();
+                f32::from_bits(bits.saturating_add(1 << 12) & !((1 << 13) - 1))
+            }
+        }
+    }
 }
 
 /// Samples that are empty stand for a plane that was not asked for: it is left out.
@@ -54,7 +74,7 @@ pub(super) fn push_three(
     let is_half = precision == Precision::Half && values.iter().flatten().all(|v| fits_half(*v));
     for (c, name) in names.into_iter().enumerate() {
         let name = format!("{layer}{name}");
-        let samples = values.iter().map(|v| v[c]);
+        let samples = values.iter().map(|v| precision.rounded(v[c]));
         match is_half {
             true => push_channel(
                 channels,
@@ -94,8 +114,27 @@ mod tests {
         assert_eq!(types(&[[0.1, 65505.0, -2.0]], Precision::Half), [false; 3]);
         assert_eq!(types(&[[0.1, f32::NAN, -2.0]], Precision::Half), [false; 3]);
         assert_eq!(types(&[[0.1, 0.5, -2.0]], Precision::Single), [false; 3]);
+        assert_eq!(types(&[[0.5; 3]], Precision::Steps), [false; 3]);
         assert!(types(&[], Precision::Half).is_empty());
         assert!(is_half(0.5) && !is_half(0.1));
+    }
+
+    #[test]
+    fn rounding_loses_nothing_that_shows() {
+        use crate::scene::srgb::decode8;
+        let black = decode8(1);
+        for value in [0.3f32, -0.3, 1e-3, 7.25, 12345.678] {
+            let step = Precision::Steps.rounded(value);
+            assert!((step - value).abs() <= 0.01 * black, "{value}: {step}");
+            let digits = Precision::Digits.rounded(value);
+            assert!((digits / value - 1.0).abs() < 5e-4, "{value}: {digits}");
+            assert_eq!(digits.to_bits() & 0x1fff, 0);
+        }
+        assert_ne!(Precision::Steps.rounded(0.3), 0.3, "control");
+        for value in [0.0, f32::INFINITY] {
+            assert_eq!(Precision::Steps.rounded(value), value);
+            assert_eq!(Precision::Digits.rounded(value), value);
+        }
     }
 
     /// Photographs of 8 bits are told apart: a half float of each code is read as that code.

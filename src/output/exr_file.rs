@@ -7,9 +7,14 @@ use exr::prelude::{AnyChannels, Encoding, Image, Layer, LayerAttributes, Text, W
 use exr::prelude::{Vec2, attribute::AttributeValue, attribute::Chromaticities};
 
 use super::channels::{Channels, Precision, push_channel, push_three};
+use super::cryptomatte::{self, push_mattes};
 use super::exr_header::{seal, sort_attributes, unsealed};
 use super::exr_text::text_value;
 use super::{ExrPicture, Metadata, OutputError, Target, write_bytes};
+use crate::renderer::MotionVectors;
+
+/// Of motion vectors, to a pixel.
+const VECTOR_STEPS: f32 = 1024.0;
 
 /// ITU-R BT.709 primaries and D65.
 fn rec709() -> Chromaticities {
@@ -40,27 +45,30 @@ pub(super) fn write_layers<'a>(
         picture,
         planes,
         parts,
-        noise,
+        added,
+        motion,
+        mattes,
         metadata,
         keeps_photo,
     } = exr;
-    let of_photo = match keeps_photo {
-        true => Precision::Single,
-        false => Precision::Half,
+    let (of_photo, of_change) = match keeps_photo {
+        true => (Precision::Single, Precision::Single),
+        false => (Precision::Half, Precision::Steps),
     };
     for (layer, values, precision) in [
         ("", &picture.linear, of_photo),
         // Of one type with its A, which needs all bits where little of a bright photograph shows: readers want a layer to be of one.
         ("virtual.", &parts.virtual_light, Precision::Single),
-        // It may take nearly all of the photograph's light: what is left are its last bits.
-        ("change.", &parts.change, Precision::Single),
+        // It may take nearly all of the photograph's light: what is left are the last bits that this has.
+        ("change.", &parts.change, of_change),
         ("ratio.", &parts.ratio, Precision::Half),
-        ("noise.", noise, Precision::Half),
+        ("sharpness.", &added.sharpness, Precision::Half),
+        ("noise.", &added.noise, Precision::Half),
         ("mixed.", &planes.mixed, Precision::Half),
         ("real.", &planes.real, Precision::Half),
         ("difference.", &planes.difference, Precision::Half),
         ("albedo.", &planes.albedo, Precision::Half),
-        ("variance.", &planes.variance, Precision::Single),
+        ("variance.", &planes.variance, Precision::Digits),
     ] {
         push_three(&mut channels, layer, ["R", "G", "B"], values, precision);
     }
@@ -81,6 +89,20 @@ pub(super) fn write_layers<'a>(
         .as_ref()
         .map(Metadata::attributes)
         .unwrap_or_default();
+    if let Some(MotionVectors { forward, backward }) = motion {
+        for (layer, vectors) in [("forward", forward), ("backward", backward)] {
+            for (axis, name) in ["u", "v"].into_iter().enumerate() {
+                let rounded =
+                    |vector: &[f32; 2]| (vector[axis] * VECTOR_STEPS).round() / VECTOR_STEPS;
+                let values: Vec<f32> = vectors.iter().map(rounded).collect();
+                push_channel(&mut channels, &format!("{layer}.{name}"), values);
+            }
+        }
+    }
+    if let Some(mattes) = mattes {
+        push_mattes(&mut channels, mattes);
+        attributes.extend(cryptomatte::attributes(mattes));
+    }
     attributes.extend(texts.map(|(name, text)| (Text::from(name), text_value(text))));
     write_channels(target, picture.width, picture.height, channels, attributes)
 }

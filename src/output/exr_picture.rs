@@ -3,9 +3,9 @@
 use super::channels::is_half;
 use super::{ExrLayer, ExrLayers, Metadata};
 use crate::film::{Film, Parts, Picture, Planes, planes};
-use crate::renderer::Renderer;
+use crate::renderer::{Mattes, MotionVectors, Renderer};
 use crate::scene::{Composite, EncodedPhoto, Photo};
-use crate::stages::Finished;
+use crate::stages::{Added, Finished};
 
 /// A picture with its layers, linear Rec.709. Those that are empty are left out of the file.
 #[derive(Clone, Debug)]
@@ -14,8 +14,12 @@ pub struct ExrPicture {
     pub picture: Picture,
     pub planes: Planes,
     pub parts: Parts,
-    /// What the noise stage added to the composite.
-    pub noise: Vec<[f32; 3]>,
+    /// What stages added to the composite.
+    pub added: Added,
+    /// What moves where; `None`: nobody asked.
+    pub motion: Option<MotionVectors>,
+    /// The objects apart; `None`: nobody asked.
+    pub mattes: Option<Mattes>,
     /// `None`: of a frame that is passed on as it came.
     pub metadata: Option<Metadata>,
     /// The photograph has finer steps than half floats: R, G and B keep all of its bits.
@@ -29,7 +33,9 @@ impl ExrPicture {
             picture,
             planes,
             parts: Parts::default(),
-            noise: Vec::new(),
+            added: Added::default(),
+            motion: None,
+            mattes: None,
             metadata: Some(metadata),
             keeps_photo: false,
         }
@@ -48,14 +54,19 @@ impl ExrPicture {
         if layers.need_parts() {
             exr.parts = Parts::of(shown, scene.settings.composite);
         }
-        exr.noise = finished.noise;
+        exr.added = finished.added;
         exr.keeps_photo = scene.photo.as_ref().is_some_and(is_fine);
         exr.pick(layers);
         exr
     }
 
-    /// A frame in which nothing is virtual.
-    pub fn untouched(photo: &Photo, composite: Composite, layers: &ExrLayers) -> Self {
+    /// A frame in which nothing is virtual, of a sequence that has virtual objects of these names.
+    pub fn untouched(
+        photo: &Photo,
+        composite: Composite,
+        layers: &ExrLayers,
+        objects: &[String],
+    ) -> Self {
         let film = Film::new(photo.width, photo.height, 0, layers.need_guides());
         let mut exr = Self {
             picture: Picture {
@@ -65,7 +76,13 @@ impl ExrPicture {
             },
             planes: planes(&film, None),
             parts: Parts::of(&film, composite),
-            noise: vec![[0.0; 3]; film.pixels.len()],
+            added: Added {
+                sharpness: vec![[0.0; 3]; film.pixels.len()],
+                noise: vec![[0.0; 3]; film.pixels.len()],
+            },
+            motion: (layers.need_motion()).then(|| MotionVectors::none(film.pixels.len())),
+            mattes: (layers.need_mattes())
+                .then(|| Mattes::empty(objects.to_vec(), film.pixels.len())),
             metadata: None,
             keeps_photo: is_fine(photo),
         };
@@ -79,14 +96,15 @@ impl ExrPicture {
             picture,
             planes,
             parts,
-            noise,
+            added,
             ..
         } = self;
         let colours = [
             (ExrLayer::Virtual, &mut parts.virtual_light),
             (ExrLayer::Change, &mut parts.change),
             (ExrLayer::Ratio, &mut parts.ratio),
-            (ExrLayer::Noise, noise),
+            (ExrLayer::Sharpness, &mut added.sharpness),
+            (ExrLayer::Noise, &mut added.noise),
             (ExrLayer::Composite, &mut picture.linear),
             (ExrLayer::Mixed, &mut planes.mixed),
             (ExrLayer::Real, &mut planes.real),

@@ -9,6 +9,7 @@ pub enum ExrLayer {
     Virtual,
     Change,
     Ratio,
+    Sharpness,
     Noise,
     Mixed,
     Real,
@@ -19,14 +20,17 @@ pub enum ExrLayer {
     Mask,
     Depth,
     Samples,
+    Motion,
+    Cryptomatte,
 }
 
 impl ExrLayer {
-    pub const NAMES: [(&str, Self); 14] = [
+    pub const NAMES: [(&str, Self); 17] = [
         ("composite", Self::Composite),
         ("virtual", Self::Virtual),
         ("change", Self::Change),
         ("ratio", Self::Ratio),
+        ("sharpness", Self::Sharpness),
         ("noise", Self::Noise),
         ("difference", Self::Difference),
         ("mask", Self::Mask),
@@ -37,15 +41,18 @@ impl ExrLayer {
         ("samples", Self::Samples),
         ("real", Self::Real),
         ("mixed", Self::Mixed),
+        ("motion", Self::Motion),
+        ("cryptomatte", Self::Cryptomatte),
     ];
 
     /// What a compositor needs, without light that the composite does not take: depth and normal cost each ray its first hit.
-    const USUAL: [Self; 11] = [
+    const USUAL: [Self; 12] = [
         Self::Composite,
         Self::Difference,
         Self::Virtual,
         Self::Change,
         Self::Ratio,
+        Self::Sharpness,
         Self::Noise,
         Self::Mask,
         Self::Depth,
@@ -100,9 +107,19 @@ impl ExrLayers {
             .any(|layer| self.has(*layer))
     }
 
-    /// What the noise stage adds is kept.
-    pub fn need_noise(&self) -> bool {
-        self.has(ExrLayer::Noise)
+    /// What single stages add is kept.
+    pub fn need_stages(&self) -> bool {
+        self.has(ExrLayer::Sharpness) || self.has(ExrLayer::Noise)
+    }
+
+    /// Frames before and after are wanted.
+    pub fn need_motion(&self) -> bool {
+        self.has(ExrLayer::Motion)
+    }
+
+    /// Objects are told apart.
+    pub fn need_mattes(&self) -> bool {
+        self.has(ExrLayer::Cryptomatte)
     }
 
     pub(super) fn has(&self, layer: ExrLayer) -> bool {

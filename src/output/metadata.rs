@@ -140,6 +140,7 @@ fn stages_of(scene: &Scene) -> String {
     let names = [
         (stages.antialias.as_ref()).map(|antialias| format!("antialias (beta {})", antialias.beta)),
         (stages.motion_blur.as_ref().filter(|blur| copies(blur))).map(|_| "copies".to_owned()),
+        (stages.sharpness.as_ref()).map(|_| "sharpness".to_owned()),
         (stages.noise.as_ref())
             .map(|noise| format!("noise ({}, scale {})", noise.method.name(), noise.scale)),
         (stages.cartoon.as_ref()).map(|cartoon| format!("cartoon ({})", cartoon.style.name())),

@@ -1,6 +1,7 @@
 //! Pictures to files: PNG and multilayer EXR, written beside the target and renamed, so that no broken picture is ever left.
 
 mod channels;
+mod cryptomatte;
 mod exr_file;
 mod exr_header;
 mod exr_picture;

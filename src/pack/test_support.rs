@@ -54,6 +54,7 @@ pub fn test_scene() -> Scene {
         stages: Stages::default(),
         allowed: Vec::new(),
         focal_length_mm: None,
+        photo_file: None,
         warnings: Vec::new(),
     }
 }

@@ -10,7 +10,7 @@ use crate::output::{
 };
 use crate::renderer::{Budget, Delivered, Progress, Renderer, RendererOptions, Watcher};
 use crate::scene::Scene;
-use crate::stages::finish_with_noise;
+use crate::stages::finish_in_layers;
 
 /// Below both renderers of the window.
 const STILL_NICE: i32 = 15;
@@ -123,7 +123,7 @@ fn render(
     }
     let scene = renderer.scene();
     let Delivered { picture, film, .. } = renderer.delivered();
-    let finished = finish_with_noise(picture, renderer.film(), scene, 0, None, None);
+    let finished = finish_in_layers(picture, renderer.film(), scene, 0, None, None);
     let photo = scene.photo.as_ref();
     let written = match is_exr {
         true => {

@@ -49,6 +49,21 @@ impl Moving {
         self.replay_real(core)
     }
 
+    /// Looks at the objects at each instant, with the ends of its samples by row, in rays per pixel. The backend is not told where they stand.
+    pub fn each_instant(
+        &self,
+        core: &mut Core,
+        mut look: impl FnMut(&Core, &[u32]),
+    ) -> Result<(), RenderError> {
+        for instant in &self.instants {
+            core.scene.set_time(instant.time_secs);
+            core.packed.rebuild_moving(&core.scene)?;
+            look(core, &ends_of(core, instant));
+        }
+        core.scene.set_time(core.time_secs);
+        Ok(())
+    }
+
     /// What edge pixels lack, each sample at its own instant; not cancelled.
     pub fn replay_real(&self, core: &mut Core) -> Result<(), RenderError> {
         let end = core.scene.settings.rays_per_pixel;

@@ -11,21 +11,28 @@ use crate::scene::projection::project;
 use crate::scene::{Camera, Object, Side};
 use crate::stages::{ObjectBlur, PictureMotion};
 
-/// The frame before.
+/// A frame beside the one that is rendered, through the same lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PreviousView {
+pub struct NeighbourView {
     pub world_from_camera: DMat4,
     pub time_secs: f64,
+}
+
+impl NeighbourView {
+    /// The camera there, if `now` is the camera of the frame that is rendered.
+    pub(super) fn camera(&self, now: &Camera) -> Camera {
+        Camera {
+            world_from_camera: self.world_from_camera,
+            ..now.clone()
+        }
+    }
 }
 
 impl Renderer {
     /// The motion of every virtual object's centre from the frame before to this one (Fischer and Bartz 2006, equation 11), and which object
     /// each pixel shows. The centre is that of the box around the object's vertices.
-    pub fn picture_motion(&self, previous: &PreviousView) -> PictureMotion {
-        let before = Camera {
-            world_from_camera: previous.world_from_camera,
-            ..self.core.scene.camera.clone()
-        };
+    pub fn picture_motion(&self, previous: &NeighbourView) -> PictureMotion {
+        let before = previous.camera(&self.core.scene.camera);
         let objects = self.core.scene.objects.iter().enumerate();
         let blurs = objects
             .filter(|(_, object)| object.side == Side::Virtual)
@@ -57,29 +64,39 @@ impl Renderer {
 
     fn objects_of_pixels(&self) -> Vec<u32> {
         let packed = &self.core.packed;
-        let pinhole = Frame {
-            aperture_radius: 0.0,
-            ..packed.frame
-        };
+        let pinhole = pinhole(&packed.frame);
         (self.core.film.pixels.par_iter().enumerate())
             .map(|(pixel, sums)| {
                 if sums.m == 0 {
                     return NONE;
                 }
-                let (x, y) = (pixel as u32 % pinhole.width, pixel as u32 / pinhole.width);
-                let ray = camera_ray(&pinhole, x as f32 + 0.5, y as f32 + 0.5, 0.5, 0.5);
-                let hit = packed.virtual_bvh.closest(&Ray {
-                    origin: ray.origin,
-                    direction: ray.direction,
-                    t_min: 0.0,
-                    t_max: f32::INFINITY,
-                    skip: NONE,
-                });
-                match hit.triangle {
+                let ray = central_ray(&pinhole, pixel);
+                match packed.virtual_bvh.closest(&ray).triangle {
                     NONE => NONE,
                     triangle => packed.triangles[triangle as usize].object,
                 }
             })
             .collect()
+    }
+}
+
+/// The frame without its lens.
+pub(super) fn pinhole(frame: &Frame) -> Frame {
+    Frame {
+        aperture_radius: 0.0,
+        ..*frame
+    }
+}
+
+/// Through the middle of a pixel, named by its row-major index.
+pub(super) fn central_ray(pinhole: &Frame, pixel: usize) -> Ray {
+    let (x, y) = (pixel as u32 % pinhole.width, pixel as u32 / pinhole.width);
+    let ray = camera_ray(pinhole, x as f32 + 0.5, y as f32 + 0.5, 0.5, 0.5);
+    Ray {
+        origin: ray.origin,
+        direction: ray.direction,
+        t_min: 0.0,
+        t_max: f32::INFINITY,
+        skip: NONE,
     }
 }

@@ -103,7 +103,8 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
     let root = Table::root(source, document.get_ref());
     root.refuse_unknown(&[TABLES, Stages::TABLES].concat())?;
     let mut warnings = Vec::new();
-    let (photo, photo_settings) = read_photo(&root, given.photo, &mut warnings)?;
+    let (photo, mut photo_settings) = read_photo(&root, given.photo, &mut warnings)?;
+    let photo_file = photo_settings.file.take();
     let settings = read_settings(&root, photo_settings)?;
     let stages = Stages::read(&root)?;
     let allowed = read_allowed(&root)?;
@@ -144,6 +145,7 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
         name: scene_name(&source.path),
         path: source.path.clone(),
         photo,
+        photo_file,
         camera,
         lens,
         focal_length_mm,

@@ -65,6 +65,8 @@ pub struct Scene {
     pub name: String,
     pub path: PathBuf,
     pub photo: Option<Photo>,
+    /// The file that it was read from.
+    pub photo_file: Option<PathBuf>,
     pub camera: Camera,
     pub lens: Lens,
     /// Of the lens, where the file says it.

@@ -1,6 +1,6 @@
 //! `[photo]`: the camera image and the exposure that ties the scene to it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::error::Result;
 use super::reader::{Choice, Node, Table};
@@ -30,12 +30,19 @@ pub(super) fn read_photo(
         warnings.extend(given.as_ref().and_then(Photo::orientation_note));
         return Ok((given, PhotoSettings::default()));
     };
+    let mut file = None;
     let photo = match given {
         Some(photo) => {
             table.optional("image", Node::note_file)?;
             Some(photo)
         }
-        None => table.optional("image", |node| read_photo_image(node, warnings))?,
+        None => {
+            let read = table.optional("image", |node| read_photo_image(node, warnings))?;
+            read.map(|(path, photo)| {
+                file = Some(path);
+                photo
+            })
+        }
     };
     let exposure = table.optional("exposure_ev", |node| read_exposure(node, photo.is_some()))?;
     let upright = table.optional("orientation", |node| match node.string()? {
@@ -53,6 +60,7 @@ pub(super) fn read_photo(
         }
     });
     let settings = PhotoSettings {
+        file,
         exposure: exposure.unwrap_or(Exposure::Ev(0.0)),
         upright_photo,
         backdrop: read_backdrop(&table)?,
@@ -62,6 +70,8 @@ pub(super) fn read_photo(
 
 /// What is set beside the image.
 pub(super) struct PhotoSettings {
+    /// The image's; `None`: the photograph came otherwise, or there is none.
+    pub file: Option<PathBuf>,
     pub exposure: Exposure,
     pub upright_photo: bool,
     pub backdrop: Backdrop,
@@ -70,6 +80,7 @@ pub(super) struct PhotoSettings {
 impl Default for PhotoSettings {
     fn default() -> Self {
         Self {
+            file: None,
             exposure: Exposure::Ev(0.0),
             upright_photo: false,
             backdrop: Backdrop::Photograph(None),
@@ -118,11 +129,11 @@ fn read_exposure(node: &Node, has_photo: bool) -> Result<Exposure> {
     Ok(Exposure::Auto)
 }
 
-fn read_photo_image(node: &Node, warnings: &mut Vec<String>) -> Result<Photo> {
+fn read_photo_image(node: &Node, warnings: &mut Vec<String>) -> Result<(PathBuf, Photo)> {
     let path = node.existing_file()?;
     let (photo, notes) = Photo::read(&path).map_err(|problem| node.file_error(&path, problem))?;
     warnings.extend(node.file_warnings(notes));
-    Ok(photo)
+    Ok((path, photo))
 }
 
 /// Width, height and codes of an image file as the camera stored them, with no colour decoded.

@@ -13,12 +13,12 @@ use super::{Event, SequenceError, SequenceOptions};
 use crate::output::{ExrLayers, ExrPicture, Metadata};
 use crate::pack::next_anchor;
 use crate::renderer::{
-    Budget, Delivered, ErrorGoal, FrameEdit, PreviousView, RayCounts, Renderer, RendererOptions,
-    Watcher,
+    Budget, Delivered, ErrorGoal, FrameEdit, Mattes, NeighbourView, RayCounts, Renderer,
+    RendererOptions, Watcher,
 };
 use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
 use crate::scene::{Camera, Lens, MotionBlurMethod, Scene};
-use crate::stages::{Finished, GpuStages, finish, finish_with_noise};
+use crate::stages::{Finished, GpuStages, finish, finish_in_layers};
 use crate::video::{FrameSink, Header, Pixels, SinkPlan, Taken, VideoFrame};
 
 /// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
@@ -221,12 +221,12 @@ impl Sequence<'_> {
         };
         let time_secs = view.time_secs.unwrap_or(0.0);
         let near = near(&self.whole.views, time_secs);
-        let previous = near
-            .key_before(time_secs)
-            .map(|(time_secs, pose)| PreviousView {
-                world_from_camera: pose,
-                time_secs,
-            });
+        let neighbour = |(time_secs, world_from_camera)| NeighbourView {
+            world_from_camera,
+            time_secs,
+        };
+        let previous = near.key_before(time_secs).map(neighbour);
+        let next = near.key_after(time_secs).map(neighbour);
         let lens = Lens {
             focus_distance_m: pulled_focus(
                 self.whole.options.focus_pull_m,
@@ -295,6 +295,12 @@ impl Sequence<'_> {
             Some(goal) => renderer.render_to_error(goal, watcher)?,
             None => renderer.advance(Budget::Complete, watcher)?,
         }
+        let layers = started.sink.layers().cloned();
+        let wants = |layer: fn(&ExrLayers) -> bool| layers.as_ref().is_some_and(layer);
+        let mattes = (wants(ExrLayers::need_mattes).then(|| renderer.mattes())).transpose()?;
+        let vectors = wants(ExrLayers::need_motion)
+            .then(|| renderer.motion_vectors(previous.as_ref(), next.as_ref()));
+        let vectors = vectors.transpose()?;
         self.seconds.render += begin.elapsed().as_secs_f64();
         if watcher.is_cancelled() {
             return Ok(false);
@@ -307,9 +313,8 @@ impl Sequence<'_> {
         let motion = previous
             .filter(|_| copies)
             .map(|previous| renderer.picture_motion(&previous));
-        let layers = started.sink.layers().cloned();
-        let finish = match layers.as_ref().is_some_and(ExrLayers::need_noise) {
-            true => finish_with_noise,
+        let finish = match layers.as_ref().is_some_and(ExrLayers::need_stages) {
+            true => finish_in_layers,
             false => finish,
         };
         let finished = finish(
@@ -322,7 +327,11 @@ impl Sequence<'_> {
         );
         let exr = layers.map(|layers| {
             let metadata = Metadata::of(renderer, started.scene_hash.clone());
-            ExrPicture::of(renderer, metadata, &film, finished.clone(), &layers)
+            ExrPicture {
+                motion: vectors,
+                mattes,
+                ..ExrPicture::of(renderer, metadata, &film, finished.clone(), &layers)
+            }
         });
         drop(film);
         let Finished {
@@ -413,6 +422,7 @@ impl Sequence<'_> {
             output: self.whole.output.clone(),
             layers,
             composite: scene.settings.composite,
+            objects: Mattes::names_of(&scene),
             fingerprint: self.whole.fingerprint(&scene),
             header,
             png_bits: options.png_bits,

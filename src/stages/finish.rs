@@ -74,10 +74,17 @@ impl Shot<'_> {
 #[derive(Clone, Debug)]
 pub struct Finished {
     pub picture: Picture,
-    /// What the noise stage added; empty if it did not run, or nobody asked.
-    pub noise: Vec<[f32; 3]>,
+    pub added: Added,
     pub notes: Vec<String>,
     pub seconds: StageSeconds,
+}
+
+/// What single stages added to the picture; empty if they did not run, or nobody asked.
+#[derive(Clone, Debug, Default)]
+pub struct Added {
+    /// To the virtual light, by its point spread.
+    pub sharpness: Vec<[f32; 3]>,
+    pub noise: Vec<[f32; 3]>,
 }
 
 /// What each stage took, by its name; 0 if it did not run.
@@ -116,8 +123,8 @@ impl Serialize for StageSeconds {
     }
 }
 
-/// As [`finish`], and keeps what the noise stage adds.
-pub fn finish_with_noise(
+/// As [`finish`], and keeps what sharpness and noise add.
+pub fn finish_in_layers(
     picture: Picture,
     film: &Film,
     scene: &Scene,
@@ -163,28 +170,32 @@ impl<'a> Shot<'a> {
         }
     }
 
-    fn finish(mut self, gpu: Option<&GpuStages>, keeps_noise: bool) -> Finished {
+    fn finish(mut self, gpu: Option<&GpuStages>, in_layers: bool) -> Finished {
         let mut seconds = StageSeconds::default();
-        let mut noise = Vec::new();
+        let mut added = Added::default();
         for (stage, seconds) in STAGES.iter().zip(&mut seconds.0) {
             if !(stage.wants)(&self) {
                 continue;
             }
-            let keeps = keeps_noise && stage.name == "noise";
-            let before = keeps.then(|| self.picture.linear.clone());
+            let layer = match stage.name {
+                "sharpness" if in_layers => Some(&mut added.sharpness),
+                "noise" if in_layers => Some(&mut added.noise),
+                _ => None,
+            };
+            let before = layer.map(|layer| (layer, self.picture.linear.clone()));
             let begin = Instant::now();
             self.run(stage, gpu);
             *seconds = begin.elapsed().as_secs_f64();
-            if let Some(before) = before {
+            if let Some((layer, before)) = before {
                 let pixels = self.picture.linear.iter().zip(before);
-                noise = pixels
+                *layer = pixels
                     .map(|(with, without)| std::array::from_fn(|c| with[c] - without[c]))
                     .collect();
             }
         }
         Finished {
             picture: self.picture,
-            noise,
+            added,
             notes: self.notes,
             seconds,
         }

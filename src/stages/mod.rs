@@ -26,7 +26,7 @@ mod tests;
 
 pub use device::GpuStages;
 pub use encoded::EncodedImage;
-pub use finish::{Finished, StageSeconds, finish, finish_with_noise};
+pub use finish::{Added, Finished, StageSeconds, finish, finish_in_layers};
 pub use motion_blur::{ObjectBlur, PictureMotion};
 
 /// In the order in which a picture goes through them.

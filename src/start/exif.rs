@@ -26,6 +26,17 @@ pub fn noted_focal_length(path: &Path, size: (u32, u32)) -> Result<Option<Claim<
     Ok(tags.ok().and_then(|tags| focal_length(&tags, size)))
 }
 
+/// The focal length in pixels of a photograph of `size` pixels, as its camera notes it; `None`: it does not, or has not taken the whole of it.
+pub fn focal_px_of_whole(path: &Path, (width, height): (u32, u32)) -> Option<f64> {
+    let bytes = read_file(path, MAX_PICTURE_BYTES).ok()?;
+    let tags = Reader::new().read_from_container(&mut Cursor::new(bytes));
+    let tags = tags.ok()?;
+    if cropped(&tags, f64::from(width), f64::from(height)) {
+        return None;
+    }
+    focal_length(&tags, (width, height)).map(|focal| focal.value)
+}
+
 /// The lens as the camera notes it; its focus is not noted. `None`: not all of it is there.
 pub fn noted_lens(path: &Path) -> Option<ThinLens> {
     let bytes = read_file(path, MAX_PICTURE_BYTES).ok()?;

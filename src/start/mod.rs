@@ -26,6 +26,7 @@ mod view;
 pub use claim::Claim;
 pub use compose::{Made, compose};
 pub use depth::DepthUnit;
+pub use exif::focal_px_of_whole;
 pub use mirror_ball::Ball;
 pub use scan::Scan;
 pub use sun::Shadow;

@@ -36,7 +36,7 @@ impl Session {
         if lens.distortion.model == crate::distortion::LENS_RADIAL {
             let [k1, k2, p1, p2, k3, ..] = lens.distortion.coefficients;
             line(format_args!(
-                "distortion = {{ k1 = {k1:.6}, k2 = {k2:.6}, p1 = {p1:.6}, p2 = {p2:.6}, k3 = {k3:.6} }}\n"
+                "distortion = [{k1:.6}, {k2:.6}, {p1:.6}, {p2:.6}, {k3:.6}]\n"
             ));
         }
         if let Some(pose) = self

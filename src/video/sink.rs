@@ -43,6 +43,8 @@ pub struct SinkPlan<'a> {
     /// Of EXR files.
     pub layers: ExrLayers,
     pub composite: Composite,
+    /// Names of the virtual objects, for the layers that tell them apart.
+    pub objects: Vec<String>,
     /// Frames of another render are replaced.
     pub overwrite: bool,
     /// The frames to come, where they are known.
@@ -54,6 +56,7 @@ pub struct FrameSink {
     png_bits: Option<PngBits>,
     layers: ExrLayers,
     composite: Composite,
+    objects: Vec<String>,
     header: Header,
 }
 
@@ -98,6 +101,7 @@ impl FrameSink {
             png_bits: plan.png_bits,
             layers: plan.layers,
             composite: plan.composite,
+            objects: plan.objects,
             header: plan.header,
         })
     }
@@ -144,6 +148,10 @@ impl FrameSink {
         Ok(())
     }
 
+    fn untouched(&self, photo: &Photo) -> ExrPicture {
+        ExrPicture::untouched(photo, self.composite, &self.layers, &self.objects)
+    }
+
     /// Writes a frame whose photograph is `frame`'s.
     ///
     /// # Errors
@@ -179,7 +187,7 @@ impl FrameSink {
     /// As [`FrameSink::write`].
     pub fn pass(&mut self, name: &FrameName, frame: &VideoFrame) -> Result<(), VideoError> {
         if self.layers().is_some() {
-            let exr = ExrPicture::untouched(&frame.photo, self.composite, &self.layers);
+            let exr = self.untouched(&frame.photo);
             return self.write_exr(name, &exr);
         }
         match (&self.kind, &frame.pixels) {
@@ -228,7 +236,7 @@ impl FrameSink {
                     Some(bytes) => write_bytes(&path, &bytes)?,
                     None if pictures.format == Format::Exr => {
                         let photo = grey_photo(&self.header);
-                        let exr = ExrPicture::untouched(&photo, self.composite, &self.layers);
+                        let exr = self.untouched(&photo);
                         self.write_exr(name, &exr)?;
                     }
                     None => {

@@ -20,6 +20,8 @@ pub enum Phase {
     Kernels,
     /// Samples are taken.
     Rendering,
+    /// Light is fitted to the photograph's shading.
+    FittingLight,
 }
 
 impl Phase {
@@ -32,6 +34,7 @@ impl Phase {
             Self::LookingAhead => "looking ahead",
             Self::Kernels => "compiling kernels",
             Self::Rendering => "rendering",
+            Self::FittingLight => "fitting the light",
         }
     }
 }

@@ -230,3 +230,49 @@ fn light_that_does_not_fit_the_photograph_is_told() {
         assert_eq!(said.contains("stops too"), is_told, "{ev}: {said}");
     }
 }
+
+/// A grey JPEG whose tags note a focal length as on 35 mm film.
+fn noted(focal_mm: u16) -> Vec<u8> {
+    let mut jpeg = Vec::new();
+    let grey = image::RgbImage::from_pixel(64, 48, image::Rgb([188; 3]));
+    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 95);
+    grey.write_with_encoder(encoder).expect("encodes");
+    // TIFF, the least significant byte first: a directory with one entry, the EXIF directory after it, with FocalLengthIn35mmFilm alone.
+    let mut tags = b"Exif\0\0II*\0\x08\0\0\0".to_vec();
+    let entry = |tag: u16, kind: u16, value: u32| {
+        let mut directory = 1u16.to_le_bytes().to_vec();
+        directory.extend([tag, kind].iter().flat_map(|number| number.to_le_bytes()));
+        directory.extend([1, value, 0].iter().flat_map(|number| number.to_le_bytes()));
+        directory
+    };
+    tags.extend(entry(0x8769, 4, 26));
+    tags.extend(entry(0xa405, 3, focal_mm.into()));
+    let length = (tags.len() as u16 + 2).to_be_bytes();
+    let segment = [&[0xff, 0xe1], &length[..], &tags].concat();
+    jpeg.splice(2..2, segment);
+    jpeg
+}
+
+/// The table's camera is one of 35.7 mm.
+#[test]
+fn another_focal_length_than_the_photograph_s_camera_notes_is_told() {
+    let folder = Folder::new();
+    let scene = format!("[photo]\nimage = \"photo.jpg\"\n{TABLE}{BALL}");
+    for (focal_mm, is_told) in [(36, false), (39, false), (41, true), (26, true), (0, false)] {
+        folder.write("photo.jpg", noted(focal_mm));
+        folder.write("scene.toml", &scene);
+        let said = stdout(&folder.run("check scene.toml"));
+        assert_eq!(said.contains("notes a focal length"), is_told, "{said}");
+        if focal_mm == 26 {
+            assert!(said.contains("vertical_fov_deg = 53.1"), "{said}");
+            let said = stderr(&folder.run("render scene.toml -o out.png"));
+            assert!(said.contains("notes a focal length"), "{said}");
+        }
+        folder.write(
+            "scene.toml",
+            format!("{scene}[check]\nallow = [\"focal-length\"]\n"),
+        );
+        let said = stdout(&folder.run("check scene.toml"));
+        assert_eq!(said, "nothing to tell\n");
+    }
+}

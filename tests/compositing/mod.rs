@@ -1,5 +1,7 @@
 //! The layers of EXR files put together again by another program.
 
+mod mattes;
+
 use std::process::Command;
 
 use crate::support::{Folder, root};
@@ -99,6 +101,27 @@ fn layers_are_put_together_to_the_picture() {
             let (is_same, said) = recompose(&folder, composite, &["--without", without]);
             assert!(!is_same, "control, without {without}: {said}");
         }
+    }
+}
+
+/// Sharpness filters what the layers were put together to, and is a layer itself.
+#[test]
+fn layers_are_put_together_to_the_sharpened_picture() {
+    if !has_openexr() {
+        return;
+    }
+    let folder = folder();
+    let sharp =
+        "[sharpness]\nsigma_px = [1.0, 0.9, 1.1]\nsharpening = 0.6\nsharpening_radius_px = 1.2\n";
+    folder.write("scene.toml", format!("{SCENE}{sharp}"));
+    for composite in ["additive", "quotient"] {
+        folder.succeed(&format!(
+            "render scene.toml --composite {composite} -o {composite}.exr -o {composite}.png"
+        ));
+        let (is_same, said) = recompose(&folder, composite, &[]);
+        assert!(is_same, "{composite}: {said}");
+        let (is_same, said) = recompose(&folder, composite, &["--without", "sharpness"]);
+        assert!(!is_same, "control: {said}");
     }
 }
 

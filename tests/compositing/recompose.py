@@ -30,7 +30,7 @@ def recompose(photo, layers):
     virtual = layers["virtual"].astype(np.float64)
     real = photo * layers.get("ratio", 1.0)
     picture = (1.0 - virtual[..., 3:]) * real + virtual[..., :3] + layers.get("change", 0.0)
-    return picture + layers.get("noise", 0.0)
+    return picture + layers.get("sharpness", 0.0) + layers.get("noise", 0.0)
 
 
 def main(photo, exr, png, without=None):

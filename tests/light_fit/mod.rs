@@ -177,6 +177,41 @@ fn under_a_white_sky_no_sun_is_invented() {
     );
 }
 
+/// The scene says other albedos than were photographed, each its own by 5%.
+#[test]
+fn the_scale_is_as_sure_as_it_says() {
+    let folder = folder();
+    let (mut told, mut told_off) = (0, 0);
+    for case in 0..4u32 {
+        let scale = 0.5 + 0.1 * f64::from(case);
+        let (name, light) = (format!("{case}.png"), environment(ROTATION_DEG, scale));
+        photograph(&folder, &light, &name);
+        let mut random = Random(100 + u64::from(case));
+        let text = scene(&name, &environment(ROTATION_DEG, 1.0), true);
+        let lines = text.lines().map(|line| {
+            let Some(start) = line.strip_prefix("material = { base_color = [") else {
+                return line.to_owned();
+            };
+            let (colour, rest) = start.split_once(']').expect("a list");
+            let error = 1.0 + 0.05 * random.normal();
+            let channels = colour
+                .split(", ")
+                .map(|c| c.parse::<f64>().expect("a number") * error);
+            let colour: Vec<f64> = channels.collect();
+            format!("material = {{ base_color = {colour:?}{rest}")
+        });
+        folder.write("scene.toml", lines.collect::<Vec<_>>().join("\n"));
+        folder.succeed("light fit scene.toml --keep-rotation --stats fit.json");
+        let found = &folder.json("fit.json")["scale"];
+        let (is, sigma) = (number(&found["is"]), number(&found["sigma"]));
+        assert!(sigma < 0.05 * scale, "it says something: {found:#}");
+        told += u32::from((is - scale).abs() <= 2.0 * sigma);
+        told_off += u32::from((is - 1.2 * scale).abs() <= 2.0 * sigma);
+    }
+    assert!(told >= 3, "{told} of 4 within two standard deviations");
+    assert_eq!(told_off, 0, "control: of another scale none");
+}
+
 #[test]
 fn a_photograph_of_something_else_is_told_and_changes_nothing() {
     let folder = folder();

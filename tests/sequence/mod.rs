@@ -10,3 +10,4 @@ mod outputs;
 mod ranges;
 mod resume;
 pub mod support;
+mod vectors;

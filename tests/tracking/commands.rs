@@ -213,6 +213,7 @@ fn a_first_object_stands_on_the_board() {
     film.save(&folder, "film.y4m", &markers(tags(), 4, 3, 0.04, 0.02));
     folder.write("board.toml", BOARD);
     folder.succeed("track film.y4m --board board.toml --gamma 2.2 -o poses.json --scene scene.toml --overlay check.y4m --sheet check.png");
+    folder.succeed("info scene.toml");
     let sheet = folder.open("check.png");
     assert_eq!((sheet.width(), sheet.height()), (4 * 240, 3 * 180));
     // Four frames with green sides; the rest of the sheet is empty.

@@ -52,7 +52,7 @@ fn every_layer_and_attribute_reads_back() {
         change: planes.mixed.clone(),
         ratio: planes.albedo.clone(),
     };
-    exr.noise = vec![[0.25, -0.5, 1e-3]; 6];
+    exr.added.noise = vec![[0.25, -0.5, 1e-3]; 6];
     exr.keeps_photo = true;
     write_exr(&target, &exr).unwrap();
 

@@ -38,6 +38,7 @@ impl Scene {
             stages: _,
             allowed: _,
             focal_length_mm: _,
+            photo_file: _,
             photo,
             camera,
             lens,

@@ -23,6 +23,9 @@ const MAX_FILE_BYTES: u64 = 8 << 30;
 /// Most bytes of memory that a byte of a file becomes, its own included: three corners with their normals for a face of a few bytes.
 const BYTES_PER_BYTE: u64 = 12;
 
+/// Of a triangle without normals: corners, positions and normals of its own.
+const BYTES_PER_TRIANGLE: u64 = 12 + 3 * (12 + 12);
+
 /// Vertices and faces as a file has them.
 #[derive(Debug, Default)]
 struct Mesh {
@@ -79,6 +82,8 @@ fn finish(mut mesh: Mesh, name: String) -> Result<GltfScene> {
             "it has {vertices} vertices and no faces: a cloud of points; expected a mesh; reconstruct a surface, for example in MeshLab or CloudCompare"
         ));
     }
+    memory::ensure(given as u64 * BYTES_PER_TRIANGLE, "its triangles")
+        .map_err(|shortage| format!("{shortage}; expected a smaller mesh; simplify it"))?;
     let corners = |positions: &[[f32; 3]], triangle: [u32; 3]| {
         triangle.map(|vertex| Vec3::from(positions[vertex as usize]).as_dvec3())
     };

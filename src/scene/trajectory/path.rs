@@ -62,6 +62,12 @@ impl CameraPath {
         Some(self.keys[before.checked_sub(1)?])
     }
 
+    /// The first key after a time.
+    pub fn key_after(&self, time_secs: f64) -> Option<(f64, DMat4)> {
+        let after = self.keys.partition_point(|key| key.0 <= time_secs);
+        self.keys.get(after).copied()
+    }
+
     /// The time lies between two keys or on one.
     pub fn covers(&self, time_secs: f64) -> bool {
         match (self.keys.first(), self.keys.last()) {

@@ -6,7 +6,7 @@ use mixray::bench::{Report, against, csv, markdown, text as table};
 use mixray::output::{ChannelFile, read_film};
 use mixray::scene::gltf::load_gltf;
 use mixray::scene::trajectory::{Focal, Trajectory, read_intrinsics};
-use mixray::scene::{NoiseProfile, Photo, load};
+use mixray::scene::{NoiseProfile, Photo, Primitive, load};
 use mixray::sequence::{SequenceOptions, check_poses};
 use mixray::video::{FrameSource, Taken};
 
@@ -42,6 +42,8 @@ pub fn all() -> Vec<Reader> {
             wrap: |texture| seeds::model(&texture),
             ..reader("texture", "model.glb", seeds::textures, bytes, model)
         },
+        reader("ply", "scan.ply", seeds::plys, bytes, scan),
+        reader("obj", "scan.obj", seeds::objs, text, scan),
         reader("png", "photo.png", seeds::pngs, png, photo),
         reader("jpeg", "photo.jpg", seeds::jpegs, bytes, photo),
         reader("hdr", "photo.hdr", seeds::hdrs, bytes, photo),
@@ -142,6 +144,27 @@ fn model(path: &Path) -> Outcome {
             finite(instance.object_from_local.to_cols_array(), "a transform")?;
             let positions = instance.primitive.positions.as_flattened();
             finite(positions.iter().map(|x| f64::from(*x)), "a mesh")?;
+        }
+        Ok(())
+    })
+}
+
+/// A proxy of a scanner, as a scene reads it.
+fn scan(path: &Path) -> Outcome {
+    let file = path.file_name().unwrap_or_default().display();
+    let scene = path.with_file_name("scene.toml");
+    let text = format!(
+        "[camera]\nwidth = 8\nheight = 6\nvertical_fov_deg = 45\n[[real]]\nmesh = \"{file}\"\n"
+    );
+    std::fs::write(&scene, text).expect("a writable folder");
+    named_outcome(path, load(&scene), |scene| {
+        let parts = scene.objects.iter().flat_map(|object| &object.instances);
+        for part in parts {
+            let Primitive {
+                positions, normals, ..
+            } = &*part.primitive;
+            let values = positions.iter().chain(normals).flatten();
+            finite(values.map(|x| f64::from(*x)), "a mesh")?;
         }
         Ok(())
     })

@@ -28,6 +28,67 @@ fn encoded(picture: &DynamicImage, format: ImageFormat) -> Vec<u8> {
     bytes.into_inner()
 }
 
+/// Corners of a tent, and its faces: a quad and two triangles.
+const CORNERS: [[f32; 3]; 5] = [
+    [0.0, 0.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [1.0, 0.0, -1.0],
+    [0.0, 0.0, -1.0],
+    [0.5, 1.0, -0.5],
+];
+const FACES: [&[u8]; 3] = [&[0, 1, 2, 3], &[0, 1, 4], &[1, 2, 4]];
+
+/// Text, and binary of both byte orders with normals and an element that is passed over.
+pub fn plys() -> Vec<Vec<u8>> {
+    let header = |format: &str, more: &str, after: &str| {
+        format!(
+            "ply\nformat {format} 1.0\ncomment a tent\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n{more}element face 3\nproperty list uchar uchar vertex_indices\n{after}end_header\n"
+        )
+    };
+    let words = |line: &[String]| line.join(" ") + "\n";
+    let mut text = header("ascii", "", "");
+    for corner in CORNERS {
+        text += &words(&corner.map(|x| x.to_string()));
+    }
+    for face in FACES {
+        let corners = face.iter().map(u8::to_string);
+        text += &words(
+            &std::iter::once(face.len().to_string())
+                .chain(corners)
+                .collect::<Vec<_>>(),
+        );
+    }
+    let normals = "property float nx\nproperty float ny\nproperty float nz\n";
+    let edges = "element edge 1\nproperty int vertex1\nproperty int vertex2\n";
+    let binary = |format: &str, bytes_of: fn(f32) -> [u8; 4]| {
+        let mut file = header(format, normals, edges).into_bytes();
+        for corner in CORNERS {
+            file.extend(corner.into_iter().chain([0.0, 1.0, 0.0]).flat_map(bytes_of));
+        }
+        for face in FACES {
+            file.push(face.len() as u8);
+            file.extend(face);
+        }
+        file.extend([0; 8]);
+        file
+    };
+    vec![
+        text.into_bytes(),
+        binary("binary_little_endian", f32::to_le_bytes),
+        binary("binary_big_endian", f32::to_be_bytes),
+    ]
+}
+
+/// Numbers from 1 and back from the last, with and without textures and normals.
+pub fn objs() -> Vec<Vec<u8>> {
+    let mut text = "# a tent\nmtllib tent.mtl\no tent\n".to_owned();
+    for [x, y, z] in CORNERS {
+        text += &format!("v {x} {y} {z}\n");
+    }
+    text += "vt 0 0\nvn 0 1 0\ng sides\nf 1 2 3 4\nf 1/1 2/1 5/1\nf 2//1 3//1 5//1\nf -5 -1 -2\n";
+    vec![text.into_bytes()]
+}
+
 pub fn pngs() -> Vec<Vec<u8>> {
     vec![
         include_bytes!("../data/palette.png").to_vec(),
