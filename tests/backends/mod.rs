@@ -173,11 +173,11 @@ fn specialisation_changes_no_more_than_rounding() {
     let built = renderer(load(&case.text()), case.all_planes);
     let film = |backend: &mut GpuBackend| gpu_film(backend, &built, case.all_planes);
     let (special, special_rays) = film(&mut backend_for(gpu, &built));
-    let more = features_of(scenes::case("direct_with_everything"));
+    let more = features_of(scenes::case("windows_and_fog"));
     let needed = Features::for_scene(built.packed());
     let pairs = || needed.flags().into_iter().zip(more.flags());
     assert!(pairs().all(|((_, needed), (_, held))| held || !needed));
-    assert!(pairs().filter(|(needed, held)| needed != held).count() > 8);
+    assert!(pairs().filter(|(needed, held)| needed != held).count() > 5);
     let buffers = SceneBuffers::from_parts(gpu, &SceneParts::from(built.packed()))
         .unwrap_or_else(|error| panic!("{error}"));
     let mut general =
