@@ -1,11 +1,9 @@
 //! Cryptomatte, read by another program by its published specification.
 
-use std::process::Command;
-
 use mixray::output::ChannelFile;
 
-use super::has_openexr;
-use crate::support::{Folder, root};
+use super::{has_openexr, run_python};
+use crate::support::Folder;
 
 /// What each object is, its own table left open.
 const BALL: &str = "shape = \"sphere\"\nname = \"ball\"\nsegments = 32\nscale = 0.3\ntranslation = [-0.2, 0, 0.1]\n";
@@ -51,17 +49,7 @@ fn scene(is_virtual: [bool; 3]) -> String {
 }
 
 fn decode(folder: &Folder, object: &str, mask: &str) -> (bool, String) {
-    let output = Command::new("python3")
-        .arg(root().join("tests/compositing/mattes.py"))
-        .args(["all.exr", object, mask])
-        .current_dir(folder.root())
-        .output()
-        .expect("python3 starts");
-    let said = [output.stdout, output.stderr].concat();
-    (
-        output.status.success(),
-        String::from_utf8_lossy(&said).into_owned(),
-    )
+    run_python(folder, "mattes.py", &["all.exr", object, mask])
 }
 
 /// The mask of a render in which the other objects are real: they hide what they hid.

@@ -66,11 +66,11 @@ fn has_openexr() -> bool {
     has
 }
 
-fn recompose(folder: &Folder, name: &str, more: &[&str]) -> (bool, String) {
+/// A script of this folder, run in the other; whether it succeeded, and what it said.
+fn run_python(folder: &Folder, script: &str, arguments: &[&str]) -> (bool, String) {
     let output = Command::new("python3")
-        .arg(root().join("tests/compositing/recompose.py"))
-        .args(["photo.png", &format!("{name}.exr"), &format!("{name}.png")])
-        .args(more)
+        .arg(root().join("tests/compositing").join(script))
+        .args(arguments)
         .current_dir(folder.root())
         .output()
         .expect("python3 starts");
@@ -79,6 +79,12 @@ fn recompose(folder: &Folder, name: &str, more: &[&str]) -> (bool, String) {
         output.status.success(),
         String::from_utf8_lossy(&said).into_owned(),
     )
+}
+
+fn recompose(folder: &Folder, name: &str, more: &[&str]) -> (bool, String) {
+    let files = [format!("{name}.exr"), format!("{name}.png")];
+    let named = ["photo.png", &files[0], &files[1]];
+    run_python(folder, "recompose.py", &[&named, more].concat())
 }
 
 #[test]

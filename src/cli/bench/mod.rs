@@ -8,6 +8,7 @@ mod gpu_code;
 mod gpu_frame;
 mod gpu_time;
 mod growth;
+mod on_gpu;
 mod paper;
 mod regression;
 mod rows;
