@@ -4,6 +4,7 @@
 //! depend on what else is in flight.
 
 use super::estimator::{advance, begin_sample};
+use super::fetch::{fetch_triangles, fetch_vertices};
 use super::in_flight::{InFlight, Member};
 use super::request::answer;
 use super::sharing::{TILE_STRIDE, gather, link_points, member_of, tile_of};
@@ -80,9 +81,14 @@ impl Batch {
     fn step(&mut self, scene: &PackedScene) {
         let samples = &mut self.samples;
         for &slot in self.waiting.iter().flatten() {
-            answer(scene, &mut samples[usize::from(slot)].state);
+            let state = &mut samples[usize::from(slot)].state;
+            answer(scene, state);
+            fetch_triangles(scene, state);
         }
         for queue in &mut self.waiting {
+            for &slot in queue.iter() {
+                fetch_vertices(scene, &samples[usize::from(slot)].state);
+            }
             for slot in queue.drain(..) {
                 let state = &mut samples[usize::from(slot)].state;
                 advance(scene, state);

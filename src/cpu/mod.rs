@@ -4,6 +4,7 @@ mod backdrop;
 mod batch;
 pub mod contribution;
 pub mod estimator;
+mod fetch;
 mod in_flight;
 pub mod panes;
 pub mod photons;

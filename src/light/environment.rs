@@ -8,7 +8,7 @@
 
 use glam::Vec3;
 
-use super::environment_table::interval_of;
+use super::environment_table::{interval_of, starts_count};
 use crate::math::{PI, atan2_, luminance, safe_sqrt, sincos_2pi};
 use crate::packed::{Frame, PackedScene};
 use crate::shared::shared;
@@ -161,9 +161,15 @@ fn env_corner(scene: &PackedScene, i: u32, j: u32) -> f32 {
 
 /// Last index i with cdf[base + i] <= u among `count` intervals of the environment's. (The shader halves: it has arithmetic to spare, but no memory.)
 fn find_interval(scene: &PackedScene, base: u32, count: u32, u: f32) -> u32 {
-    let entries = base as usize..=(base + count) as usize;
-    let (cdf, starts) = (&scene.env_cdf[entries.clone()], &scene.env_starts[entries]);
-    interval_of(cdf, starts, u)
+    let (width, rows) = (scene.frame.env_width, scene.frame.env_height + 1);
+    let starts_of_one = starts_count(count as usize);
+    let mut first = 0;
+    if base > 0 {
+        let row = (base - (rows + 1)) / (width + 1);
+        first = starts_count(rows as usize) + row as usize * starts_of_one;
+    }
+    let cdf = &scene.env_cdf[base as usize..=(base + count) as usize];
+    interval_of(cdf, &scene.env_starts[first..][..starts_of_one], u)
 }
 
 /// Where u lies in the interval from entry `at` of the distributions to the next.

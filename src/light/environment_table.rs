@@ -10,7 +10,7 @@ pub struct EnvironmentTable {
     /// Marginal over the height + 1 rows (height + 2 entries from 0 to 1), then for each row the conditional over its width columns
     /// (width + 1 entries).
     pub cdf: Vec<f32>,
-    /// Where [`interval_of`] begins to look, laid out as `cdf`.
+    /// Where [`interval_of`] begins to look: [`starts_count`] of the rows entries for the marginal, then as many as the columns have for each row.
     pub starts: Vec<u32>,
     /// 1 / integral of the cells' mean luminance over the sphere; 0 for a black map.
     pub normaliser: f32,
@@ -81,18 +81,28 @@ fn fill_cdf(cdf: &mut [f32], weights: &[f64]) {
     cdf[weights.len()] = 1.0;
 }
 
-/// The part of 0..1, cut into as many as there are intervals, that a number lies in. Monotonic, and the same wherever it is asked.
-fn part_of(u: f32, intervals: usize) -> usize {
-    (u * intervals as f32) as usize
+/// Intervals that a part of 0..1 holds on average: with so few parts all rows' starts stay in the second-level cache, and what is then looked
+/// through lies side by side.
+const INTERVALS_PER_PART: usize = 32;
+
+/// Entries that [`interval_of`] wants for so many intervals: one for each part, and one for what rounds up to 1.
+pub fn starts_count(intervals: usize) -> usize {
+    intervals.div_ceil(INTERVALS_PER_PART) + 1
+}
+
+/// The part that a number lies in. Monotonic, and the same wherever it is asked.
+fn part_at(u: f32, parts: usize) -> usize {
+    (u * parts as f32) as usize
 }
 
 /// For each part of 0..1 the last interval that begins in an earlier one.
 fn starts_of(cdf: &[f32]) -> Vec<u32> {
     let intervals = cdf.len() - 1;
+    let count = starts_count(intervals);
     let mut interval = 0;
-    (0..=intervals)
+    (0..count)
         .map(|part| {
-            while interval + 1 < intervals && part_of(cdf[interval + 1], intervals) < part {
+            while interval + 1 < intervals && part_at(cdf[interval + 1], count - 1) < part {
                 interval += 1;
             }
             interval as u32
@@ -100,15 +110,11 @@ fn starts_of(cdf: &[f32]) -> Vec<u32> {
         .collect()
 }
 
-/// Last interval i with cdf\[i\] <= u, for u in 0..1: the cutpoint method (Chen and Asau 1974), two steps on average where a binary search
-/// takes one for each bit.
+/// Last interval i with cdf\[i\] <= u, for u in 0..1 and the `starts` of this `cdf`: the cutpoint method (Chen and Asau 1974).
 pub fn interval_of(cdf: &[f32], starts: &[u32], u: f32) -> u32 {
-    let intervals = cdf.len() - 1;
-    let mut interval = starts[part_of(u, intervals)] as usize;
-    while interval + 1 < intervals && cdf[interval + 1] <= u {
-        interval += 1;
-    }
-    interval as u32
+    let first = starts[part_at(u, starts.len() - 1)];
+    let begins_after = cdf[first as usize + 1..cdf.len() - 1].iter();
+    first + begins_after.take_while(|&&begin| begin <= u).count() as u32
 }
 
 #[cfg(test)]
