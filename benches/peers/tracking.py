@@ -352,6 +352,42 @@ def jumps(poses):
     return sum(np.linalg.norm(cv2.Rodrigues(a[0] @ b[0].T)[0]) > np.radians(20) for a, b in pairs)
 
 
+# Markers beside the middle of the board, where an object stands.
+BESIDE = [4 * i + corner for i in (4, 7) for corner in range(4)]
+BASE = 0.02 * np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1.0]])
+
+
+def on_paper(points):
+    """The object's base, from the board as its file has it to the paper as it was found."""
+    nominal = grid_points()[BESIDE]
+    plane = np.linalg.lstsq(np.stack([np.ones(len(nominal)), nominal[:, 0], nominal[:, 2]], 1), points[BESIDE], rcond=None)[0]
+    return np.stack([np.ones(len(BASE)), BASE[:, 0], BASE[:, 2]], 1) @ plane
+
+
+def drift(frames, poses, base, k, d):
+    """Pixels from where the frame's own markers say that the middle of an object's base is to where the pose puts it: rms, and rms of its changes from frame to frame."""
+    nominal, off = grid_points()[BESIDE][:, [0, 2]], []
+    for frame, pose in zip(frames, poses):
+        if pose is None or any(p not in frame["seen"] for p in BESIDE):
+            off.append(None)
+            continue
+        plane = cv2.findHomography(nominal, np.array([frame["seen"][p] for p in BESIDE]))[0]
+        paper = cv2.perspectiveTransform(BASE[:, [0, 2]].reshape(-1, 1, 2), plane).reshape(-1, 2)
+        off.append((project(base, *pose, k, d) - paper).mean(0))
+    changes = [b - a for a, b in zip(off, off[1:]) if a is not None and b is not None]
+    return rms(np.linalg.norm([o for o in off if o is not None], axis=1)), rms(np.linalg.norm(changes, axis=1))
+
+
+def poses_of_the_data(path, count):
+    """Poses that came with the marker video; its world has the same middle, a quarter turn away, under which the base is the same."""
+    poses = [None] * count
+    for frame in json.loads(path.read_text())["frames"]:
+        if frame["camera_to_world_gltf"]:
+            matrix = np.array(frame["camera_to_world_gltf"]).reshape(4, 4) @ np.diag([1, -1, -1, 1.0])
+            poses[frame["frame"]] = matrix[:3, :3].T, -matrix[:3, :3].T @ matrix[:3, 3]
+    return poses
+
+
 def measure(mixray, data, folder):
     rows = []
 
@@ -381,6 +417,12 @@ def measure(mixray, data, folder):
     row("marker video: held-out markers, median", "0.15 px", held_out(even, own["frames"]), f"{held_out(even, own['frames']):.3f} px", "-", lambda v: v <= 0.15)
     flips = jumps(own_poses(own))
     row("marker video: flips", "0", flips, str(flips), str(jumps(peer_poses)), lambda v: v == 0)
+    came = poses_of_the_data(data / "webcam_marker_grid_video/trajectory.json", len(frames))
+    same = [pose if other is not None else None for pose, other in zip(own_poses(own), came)]
+    ours = drift(own["frames"], same, on_paper(own["points"]), own["k"], own["d"])
+    theirs = drift(own["frames"], came, BASE, K, D)
+    for what, value, other in zip(["off its place on the paper", "from frame to frame"], ours, theirs):
+        row(f"marker video: base of an object, {what}, rms", "less than with the video's own poses", (value, other), f"{value:.3f} px", f"{other:.3f} px (the video's own poses)", lambda v: v[0] < v[1])
     timed = mixray.track(folder / "grid.y4m", "--board", folder / "grid.toml", "--threads", 1, "--gamma", 1.4)
     milliseconds = 1e3 * timed["secs"] / len(frames)
     start = time.thread_time()

@@ -15,6 +15,7 @@ use crate::live::{LiveEvent, LiveOptions, run_live};
 use crate::output::{check_writable_as, write_text};
 use crate::renderer::Watcher;
 use crate::scene::{BackendChoice, Overrides};
+use crate::tracking::Code;
 use crate::video::Matrix;
 
 /// Renders a scene's virtual objects into a running stream, its camera found from markers
@@ -112,7 +113,7 @@ impl Arguments {
             input: self.input.clone(),
             output: self.output.clone(),
             board: self.board.clone(),
-            family: self.family.0,
+            code: self.family.0.map(Code::Family),
             intrinsics: self.intrinsics.clone(),
             tone: self.gamma.0,
             frame_secs: 1.0 / self.fps,

@@ -12,7 +12,9 @@ use super::values::length;
 use super::{Failure, Outcome};
 use crate::output::{check_writable, check_writable_as, extension_among, write_bytes, write_text};
 use crate::scene::trajectory::{Focal, read_intrinsics};
-use crate::tracking::{Flatness, Lens, Target, TrackOptions, read_board, track};
+use crate::tracking::{
+    Code, Flatness, Lens, Target, TrackOptions, USUAL_SHARE, read_board, read_patterns, track,
+};
 
 /// Finds the camera's pose in every frame from markers or a chessboard
 ///
@@ -22,7 +24,7 @@ pub(super) struct Arguments {
     /// Folder of pictures, .y4m file, file of JPEG pictures one after the other, or - for Y4M on standard input
     #[arg(required_unless_present = "print_board")]
     video: Option<PathBuf>,
-    /// What is in the video: TOML ([grid], [[marker]] or [chessboard]), or Kalibr's YAML
+    /// What is in the video: TOML ([grid], [[marker]], [chessboard] or [charuco]), or Kalibr's YAML
     #[arg(
         long,
         value_name = "BOARD.toml",
@@ -32,9 +34,15 @@ pub(super) struct Arguments {
     /// Side of the markers' black squares, such as 40mm, where no file says how they lie; they are put together from the frames
     #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with = "board")]
     marker_size: Option<f64>,
-    /// Family of the markers: auto, apriltag-36h11, aruco-4x4, square-binary-3x3, ...
+    /// Family of the markers: auto, apriltag-36h11, aruco-4x4, square-binary-3x3, artoolkit-4x4-bch-13-9-3, ...
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = family)]
     family: Chosen,
+    /// Pattern file of ARToolKit (.patt) that a marker shows, in place of a family; once for each marker, ids count from 0
+    #[arg(long, value_name = "FILE.patt", conflicts_with_all = ["family", "print_board"])]
+    pattern: Vec<PathBuf>,
+    /// Of a marker's side, what its pattern fills
+    #[arg(long, value_name = "SHARE", default_value_t = USUAL_SHARE, requires = "pattern")]
+    pattern_share: f64,
     /// OpenCV calibration (YAML) to begin with
     #[arg(long, value_name = "CAL.yaml")]
     intrinsics: Option<PathBuf>,
@@ -147,12 +155,19 @@ impl Arguments {
         };
         Ok(TrackOptions {
             target,
-            family: self.family.0,
+            code: self.code()?,
             lens: self.lens()?,
             fix_lens: self.fix_intrinsics,
             tone: self.gamma.0,
             flatness: self.board_flatness,
         })
+    }
+
+    fn code(&self) -> Result<Option<Code>, Failure> {
+        if self.pattern.is_empty() {
+            return Ok(self.family.0.map(Code::Family));
+        }
+        Ok(Some(read_patterns(&self.pattern, self.pattern_share)?))
     }
 
     fn lens(&self) -> Result<Option<Lens>, Failure> {

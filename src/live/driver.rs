@@ -256,7 +256,7 @@ impl Live<'_> {
         };
         let known = self.known.clone();
         Ok(Started {
-            follower: Follower::new(known, options.family, lens, options.tone),
+            follower: Follower::new(known, options.code.clone(), lens, options.tone),
             lens: scene.lens,
             camera,
             seed: scene.settings.seed,

@@ -21,7 +21,7 @@ use crate::output::OutputError;
 use crate::renderer::RenderError;
 use crate::scene::trajectory::TrajectoryError;
 use crate::scene::{Overrides, SceneError};
-use crate::tracking::{Family, Tone, TrackError};
+use crate::tracking::{Code, Tone, TrackError};
 use crate::video::{Matrix, VideoError};
 
 /// What is rendered into which stream, and how fast.
@@ -38,7 +38,7 @@ pub struct LiveOptions {
     /// Board file, or the report of a tracked video.
     pub board: PathBuf,
     /// Where the board does not tell it; `None`: whichever is found.
-    pub family: Option<&'static Family>,
+    pub code: Option<Code>,
     /// OpenCV calibration in place of the scene's intrinsics.
     pub intrinsics: Option<PathBuf>,
     /// In place of the board's.

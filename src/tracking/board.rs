@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 use super::bundle::Prior;
-use super::family::Family;
+use super::code::Code;
 
 /// Points whose places are known or being found.
 #[derive(Clone, Debug)]
@@ -17,7 +17,7 @@ pub struct Board {
     /// Of square markers: their first point by id; the other three follow clockwise from their top left.
     pub markers: BTreeMap<u32, usize>,
     /// Of square markers.
-    pub family: Option<&'static Family>,
+    pub code: Option<Code>,
     pub kind: BoardKind,
 }
 
@@ -27,7 +27,7 @@ pub enum BoardKind {
     Markers,
     /// Markers of this side, metres, put together from the frames.
     Found { side_m: f64 },
-    /// Markers in the light squares of a chessboard of so many squares; only the markers are points.
+    /// Markers in the light squares of a chessboard of so many squares; its inner corners follow them as points, row by row.
     Charuco {
         columns: usize,
         rows: usize,
@@ -125,14 +125,31 @@ impl Board {
             let corner = square_m * DVec2::new(x as f64, y as f64) + inset - middle;
             board.add(id, square(corner, side_m, 0));
         }
+        let inner = (1..rows).flat_map(|y| (1..columns).map(move |x| (x, y)));
+        board.points.extend(inner.map(|(x, y)| {
+            let place = square_m * DVec2::new(x as f64, y as f64) - middle;
+            DVec3::new(place.x, 0.0, place.y)
+        }));
         board
+    }
+
+    /// Of a ChArUco board: the point of the corner to the left of and above square (`x`, `y`).
+    pub fn between(&self, x: usize, y: usize) -> Option<usize> {
+        match self.kind {
+            BoardKind::Charuco { columns, rows, .. }
+                if (1..columns).contains(&x) && (1..rows).contains(&y) =>
+            {
+                Some(4 * self.markers.len() + (y - 1) * (columns - 1) + x - 1)
+            }
+            _ => None,
+        }
     }
 
     pub fn empty(kind: BoardKind) -> Self {
         Self {
             points: Vec::new(),
             markers: BTreeMap::new(),
-            family: None,
+            code: None,
             kind,
         }
     }

@@ -1,19 +1,28 @@
 //! Boards as files describe them: TOML of this program, and Kalibr's YAML of AprilTag grids and checkerboards.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
 use super::TrackError;
 use super::board::{Board, BoardKind, square};
-use super::family::{FAMILIES, Family};
+use super::code::Code;
+use super::families::FAMILIES;
+use super::family::Family;
+use super::pattern::Pattern;
+use super::patterns::{Patterns, USUAL_SHARE};
 use crate::decode::{MAX_TEXT_BYTES, read_text};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     family: Option<String>,
+    /// Pattern files of ARToolKit, by id, from the folder of the board's file.
+    patterns: Option<Vec<PathBuf>>,
+    /// Of the marker's side, what the pattern fills.
+    pattern_share: Option<f64>,
     grid: Option<Grid>,
     chessboard: Option<Chessboard>,
     charuco: Option<Charuco>,
@@ -93,7 +102,10 @@ pub fn read_board(path: &Path) -> Result<Board, TrackError> {
             error.message().replace('\n', ", ")
         ))
     })?;
-    board_of(&file).map_err(at)
+    let mut board = board_of(&file).map_err(at)?;
+    board.code = code_of(&file, path.parent().unwrap_or(Path::new("")), &at)?;
+    check_ids(&board).map_err(at)?;
+    Ok(board)
 }
 
 fn board_of(file: &File) -> Result<Board, String> {
@@ -106,7 +118,7 @@ fn board_of(file: &File) -> Result<Board, String> {
     if kinds.into_iter().filter(|is_there| *is_there).count() != 1 {
         return Err("it describes no board, or several; expected one of [grid], [[marker]], [chessboard], [charuco]; keep one".to_owned());
     }
-    let mut board = if let Some(grid) = &file.grid {
+    let board = if let Some(grid) = &file.grid {
         grid_of(grid)?
     } else if let Some(chessboard) = &file.chessboard {
         chessboard_of(chessboard.columns, chessboard.rows, chessboard.square_m)?
@@ -115,23 +127,55 @@ fn board_of(file: &File) -> Result<Board, String> {
     } else {
         markers_of(&file.marker)?
     };
-    if let Some(name) = &file.family {
-        board.family = Some(family_named(name)?);
-    }
-    if let Some(family) = board.family {
-        let beyond = board
-            .markers
-            .keys()
-            .find(|id| **id as usize >= family.codes.len());
-        if let Some(id) = beyond {
-            return Err(format!(
-                "{} has no marker {id}; expected ids below {}; correct it",
-                family.name,
-                family.codes.len()
-            ));
-        }
-    }
     Ok(board)
+}
+
+/// The family or the patterns that the file names, if it names any.
+fn code_of(
+    file: &File,
+    folder: &Path,
+    at: &dyn Fn(String) -> TrackError,
+) -> Result<Option<Code>, TrackError> {
+    match (&file.family, &file.patterns) {
+        (Some(_), Some(_)) => Err(at(
+            "it has `family` and `patterns`; expected one of them; remove the other".to_owned(),
+        )),
+        (Some(name), None) => Ok(Some(Code::Family(family_named(name).map_err(at)?))),
+        (None, Some(names)) => {
+            let paths: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
+            read_patterns(&paths, file.pattern_share.unwrap_or(USUAL_SHARE)).map(Some)
+        }
+        (None, None) => Ok(None),
+    }
+}
+
+/// Pattern files by id; `share`: of the marker's side, what the picture fills.
+///
+/// # Errors
+/// What cannot be used, or told apart.
+pub fn read_patterns(paths: &[PathBuf], share: f64) -> Result<Code, TrackError> {
+    let list: Result<Vec<Pattern>, TrackError> =
+        paths.iter().map(|path| Pattern::read(path)).collect();
+    let patterns = Patterns::new(list?, share).map_err(TrackError::input)?;
+    Ok(Code::Patterns(Arc::new(patterns)))
+}
+
+fn check_ids(board: &Board) -> Result<(), String> {
+    let Some(code) = &board.code else {
+        return Ok(());
+    };
+    let beyond = board
+        .markers
+        .keys()
+        .find(|id| **id as usize >= code.count());
+    match beyond {
+        Some(id) => Err(format!(
+            "{} has no marker {id}; expected ids below {}; correct it",
+            code.name(),
+            code.count()
+        )),
+        None => Ok(()),
+    }
 }
 
 /// A family by its name.
@@ -268,7 +312,7 @@ fn read_kalibr(text: &str) -> Result<Board, String> {
                 .flat_map(|row| (0..columns).map(move |column| (row * columns + column) as u32))
                 .collect();
             let mut board = Board::grid((columns, rows), &ids, (side_m, gap_m), 0);
-            board.family = Some(family_named("apriltag-36h11")?);
+            board.code = Some(Code::Family(family_named("apriltag-36h11")?));
             Ok(board)
         }
         Some("checkerboard") => chessboard_of(
@@ -314,7 +358,7 @@ mod tests {
         .unwrap();
         let corner = |id: u32| board.points[board.markers[&id]];
         assert!(corner(0).z > corner(3).z && corner(2).x > corner(0).x);
-        assert_eq!(board.family.unwrap().name, "apriltag-36h11");
+        assert_eq!(board.code.unwrap().name(), "apriltag-36h11");
     }
 
     #[test]

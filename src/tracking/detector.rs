@@ -1,9 +1,12 @@
 //! One frame looked at: its markers or corners, and which points of the board they are.
 
+use std::sync::Arc;
+
 use super::board::Board;
 use super::calibrate::Sighting;
+use super::charuco::find_between;
 use super::chessboard::find_chessboard;
-use super::family::Family;
+use super::code::Code;
 use super::frame_pose::Observation;
 use super::lens::Lens;
 use super::light::{LightImage, Luma, Tone};
@@ -23,8 +26,10 @@ pub enum FrameSeen {
 #[derive(Clone, Debug)]
 pub struct Detector {
     pub chessboard: Option<(usize, usize)>,
-    pub families: Vec<&'static Family>,
+    pub codes: Vec<Code>,
     pub tone: Tone,
+    /// A ChArUco board, whose squares' corners count too.
+    pub charuco: Option<Arc<Board>>,
 }
 
 impl Detector {
@@ -34,7 +39,13 @@ impl Detector {
             Some((columns, rows)) => {
                 FrameSeen::Corners(find_chessboard(&image, columns, rows).unwrap_or_default())
             }
-            None => FrameSeen::Markers(find_markers(&image, &self.families)),
+            None => {
+                let mut seen = find_markers(&image, &self.codes);
+                if let Some(board) = &self.charuco {
+                    seen.between = find_between(&image, board, &seen.markers);
+                }
+                FrameSeen::Markers(seen)
+            }
         }
     }
 }
@@ -62,6 +73,7 @@ pub fn sighting(seen: &FrameSeen, board: &Board, lens: Option<&Lens>) -> (Sighti
                 sighting.groups.push(start..start + 4);
                 ids.push(marker.id);
             }
+            sighting.observations.extend(&seen.between);
         }
     }
     (sighting, ids)

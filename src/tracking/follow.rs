@@ -2,7 +2,9 @@
 
 use nalgebra::DMatrix;
 
+use super::Flatness;
 use super::bundle::Solution;
+use super::code::Code;
 use super::detector::{Detector, FrameSeen, sighting};
 use super::frame_pose::Minima;
 use super::half_turn::keep_turn;
@@ -14,7 +16,6 @@ use super::pose::Pose;
 use super::prepare::prepare;
 use super::settle::settle;
 use super::tracker::{WORST_RMS_PX, minima_of, rms_px};
-use super::{Family, Flatness};
 
 /// Finds poses frame by frame.
 #[derive(Clone, Debug)]
@@ -28,19 +29,16 @@ pub struct Follower {
 }
 
 impl Follower {
-    /// `family` where the board does not tell it; `tone` in place of the board's.
-    pub fn new(
-        known: KnownBoard,
-        family: Option<&'static Family>,
-        lens: Lens,
-        tone: Option<Tone>,
-    ) -> Self {
-        let chessboard = Target::Board(known.board.clone()).chessboard();
-        let family = family.or(known.board.family);
+    /// `code` where the board does not tell it; `tone` in place of the board's.
+    pub fn new(known: KnownBoard, code: Option<Code>, lens: Lens, tone: Option<Tone>) -> Self {
+        let target = Target::Board(known.board.clone());
+        let chessboard = target.chessboard();
+        let code = code.or(known.board.code.clone());
         let tone = tone.or(known.tone).unwrap_or(Tone::Srgb);
-        let detector = (chessboard.is_some() || family.is_some()).then(|| Detector {
+        let detector = (chessboard.is_some() || code.is_some()).then(|| Detector {
             chessboard,
-            families: family.into_iter().collect(),
+            codes: code.into_iter().collect(),
+            charuco: target.charuco(),
             tone,
         });
         let parameters = LENS_PARAMETERS + 3 * known.board.points.len();
@@ -104,7 +102,7 @@ impl Follower {
         }
         let options = TrackOptions {
             target: Target::Board(self.known.board.clone()),
-            family: None,
+            code: None,
             lens: Some(self.solution.lens),
             fix_lens: true,
             tone: self.known.tone,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::DVec3;
 use serde::Deserialize;
@@ -9,7 +10,10 @@ use serde::Deserialize;
 use super::TrackError;
 use super::board::{Board, BoardKind};
 use super::board_file::{family_named, read_board};
+use super::code::Code;
 use super::light::Tone;
+use super::pattern::Pattern;
+use super::patterns::Patterns;
 use crate::decode::{MAX_POSES_BYTES, read_text};
 
 /// Standard deviation of a corner along an axis where paper is taken for flat, pixels.
@@ -37,12 +41,22 @@ struct Report {
 #[derive(Deserialize)]
 struct Named {
     name: String,
+    patterns: Option<Shown>,
+}
+
+/// Patterns in place of a family.
+#[derive(Deserialize)]
+struct Shown {
+    list: Vec<Pattern>,
+    share: f64,
 }
 
 #[derive(Deserialize)]
 struct Surface {
     #[serde(default)]
     chessboard: Option<Squares>,
+    #[serde(default)]
+    charuco: Option<Squares>,
     first_point_of_marker: BTreeMap<u32, usize>,
     points_m: Vec<[f64; 3]>,
 }
@@ -52,6 +66,8 @@ struct Squares {
     columns: usize,
     rows: usize,
     square_m: f64,
+    #[serde(default)]
+    legacy: bool,
 }
 
 /// Reads a report of a tracked video (JSON), whose board is as it was found, bent paper and all; or what [`read_board`] reads.
@@ -92,21 +108,7 @@ fn of_report(report: Report) -> Result<KnownBoard, String> {
     if !report.board.first_point_of_marker.values().all(is_inside) {
         return Err("a marker's points are not there".to_owned());
     }
-    let kind = match report.board.chessboard {
-        Some(Squares { columns, rows, .. }) if columns.checked_mul(rows) != Some(points.len()) => {
-            return Err(format!("{columns} x {rows} corners are not there"));
-        }
-        Some(Squares {
-            columns,
-            rows,
-            square_m,
-        }) => BoardKind::Chessboard {
-            columns,
-            rows,
-            square_m,
-        },
-        None => BoardKind::Markers,
-    };
+    let kind = kind_of(&report.board)?;
     let tone = match report.gamma.as_str() {
         "srgb" => Tone::Srgb,
         power => Tone::Power(power.parse().map_err(|_| format!("gamma is {power}"))?),
@@ -115,13 +117,54 @@ fn of_report(report: Report) -> Result<KnownBoard, String> {
         board: Board {
             points,
             markers: report.board.first_point_of_marker,
-            family: report
-                .family
-                .map(|family| family_named(&family.name))
-                .transpose()?,
+            code: report.family.map(code_of).transpose()?,
             kind,
         },
         noise_px: report.corner_sigma_px,
         tone: Some(tone),
     })
+}
+
+fn kind_of(surface: &Surface) -> Result<BoardKind, String> {
+    let markers = surface.first_point_of_marker.len();
+    let has = |count: Option<usize>| count == Some(surface.points_m.len());
+    match (&surface.chessboard, &surface.charuco) {
+        (Some(squares), _) => {
+            let (columns, rows) = (squares.columns, squares.rows);
+            if !has(columns.checked_mul(rows)) {
+                return Err(format!("{columns} x {rows} corners are not there"));
+            }
+            Ok(BoardKind::Chessboard {
+                columns,
+                rows,
+                square_m: squares.square_m,
+            })
+        }
+        (None, Some(squares)) => {
+            let (columns, rows) = (squares.columns, squares.rows);
+            let inner = columns
+                .saturating_sub(1)
+                .checked_mul(rows.saturating_sub(1));
+            if !has(inner.and_then(|inner| inner.checked_add(4 * markers))) {
+                return Err(format!(
+                    "the corners of {columns} x {rows} squares and {markers} markers are not there"
+                ));
+            }
+            Ok(BoardKind::Charuco {
+                columns,
+                rows,
+                square_m: squares.square_m,
+                is_legacy: squares.legacy,
+            })
+        }
+        (None, None) => Ok(BoardKind::Markers),
+    }
+}
+
+fn code_of(named: Named) -> Result<Code, String> {
+    let Some(shown) = named.patterns else {
+        return family_named(&named.name).map(Code::Family);
+    };
+    let patterns = Patterns::new(shown.list, shown.share)?;
+    Ok(Code::Patterns(Arc::new(patterns)))
 }

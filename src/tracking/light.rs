@@ -52,7 +52,7 @@ pub enum Tone {
 }
 
 impl Tone {
-    fn light(self, code: u8) -> f32 {
+    pub fn light(self, code: u8) -> f32 {
         let x = f64::from(code) / 255.0;
         let light = match self {
             Self::Srgb if x <= 0.040_45 => x / 12.92,

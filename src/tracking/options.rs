@@ -1,7 +1,9 @@
 //! What is asked of a run.
 
+use std::sync::Arc;
+
 use super::board::{Board, BoardKind, Flatness};
-use super::family::Family;
+use super::code::Code;
 use super::lens::Lens;
 use super::light::Tone;
 
@@ -9,8 +11,8 @@ use super::light::Tone;
 #[derive(Clone, Debug)]
 pub struct TrackOptions {
     pub target: Target,
-    /// `None`: whichever is found.
-    pub family: Option<&'static Family>,
+    /// `None`: whichever family is found.
+    pub code: Option<Code>,
     pub lens: Option<Lens>,
     /// The lens given holds as it is.
     pub fix_lens: bool,
@@ -38,6 +40,16 @@ impl Target {
                 _ => None,
             },
             Self::Markers { .. } => None,
+        }
+    }
+
+    /// The board, if it is a ChArUco board.
+    pub fn charuco(&self) -> Option<Arc<Board>> {
+        match self {
+            Self::Board(board) if matches!(board.kind, BoardKind::Charuco { .. }) => {
+                Some(Arc::new(board.clone()))
+            }
+            _ => None,
         }
     }
 }

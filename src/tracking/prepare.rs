@@ -1,7 +1,7 @@
-//! What the first frames decide for all: the family, and how codes become light.
+//! What the first frames decide for all: the markers' code, and how codes become light.
 
 use super::TrackError;
-use super::choice::{Choice, choose_family};
+use super::choice::{Choice, choose_code};
 use super::detector::Detector;
 use super::light::{Luma, Tone};
 use super::options::{Target, TrackOptions};
@@ -20,16 +20,17 @@ pub fn prepare(
         Some(_) => None,
         None => {
             let of_board = match &options.target {
-                Target::Board(board) => board.family,
+                Target::Board(board) => board.code.as_ref(),
                 Target::Markers { .. } => None,
             };
-            Some(choose_family(first, options.family.or(of_board))?)
+            Some(choose_code(first, options.code.as_ref().or(of_board))?)
         }
     };
-    let families = choice.iter().map(|choice| choice.family).collect();
+    let codes = choice.iter().map(|choice| choice.code.clone()).collect();
     let mut detector = Detector {
         chessboard,
-        families,
+        codes,
+        charuco: options.target.charuco(),
         tone: options.tone.unwrap_or(Tone::Srgb),
     };
     // A chessboard's corners are the same in any tone.

@@ -6,6 +6,7 @@ use glam::DVec2;
 
 use super::TrackError;
 use super::board::{Board, BoardKind, is_dark};
+use super::code::Code;
 
 mod pdf;
 
@@ -79,9 +80,19 @@ impl Board {
 
     /// Black cells, `origin` being the sheet's upper left corner, metres; and where the last of them ends.
     fn markers(&self, origin: DVec2) -> Result<(Vec<[DVec2; 4]>, DVec2), TrackError> {
-        let family = self.family.ok_or_else(|| {
-            TrackError::input("the board names no family; expected `family` at its top; add it")
-        })?;
+        let family = match &self.code {
+            Some(Code::Family(family)) => *family,
+            Some(Code::Patterns(_)) => {
+                return Err(TrackError::input(
+                    "the board's markers are patterns, whose files are too coarse to print; expected a `family`; print the pictures that they were made from",
+                ));
+            }
+            None => {
+                return Err(TrackError::input(
+                    "the board names no family; expected `family` at its top; add it",
+                ));
+            }
+        };
         if self.points.iter().any(|p| p.y.abs() > 1e-9) {
             return Err(TrackError::input(
                 "the board is not in the plane y = 0; expected one sheet; print its sides one by one",
@@ -181,7 +192,7 @@ mod tests {
         let mut board = Board::grid((1, 1), &[5], (0.04, 0.01), 0);
         assert!(board.sheet().unwrap_err().to_string().contains("family"));
         let family = Family::named("aruco-4x4").unwrap();
-        board.family = Some(family);
+        board.code = Some(Code::Family(family));
         let sheet = board.sheet().unwrap();
         let svg = sheet.svg();
         let white = family.codes[5].count_ones() as usize;
@@ -200,7 +211,7 @@ mod tests {
         }
         let chess = Board::chessboard(6, 4, 0.03).sheet().unwrap().svg();
         let charuco = Board {
-            family: Some(family),
+            code: Some(Code::Family(family)),
             ..Board::charuco((5, 4), (0.04, 0.03), true)
         };
         let black: usize = (0..10)

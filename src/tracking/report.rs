@@ -4,6 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::board::BoardKind;
 use super::bundle::Solution;
+use super::code::Code;
 use super::lens::LENS_PARAMETERS;
 use super::session::Session;
 use super::tracker::{FramePose, TrackedFrame};
@@ -125,8 +126,14 @@ impl Session {
             "rms_px": self.rms_px(),
             "corner_sigma_px": solution.noise_px,
             "gamma": tracked.tone.to_string(),
-            "family": tracked.choice.map(|choice| json!({
-                "name": choice.family.name, "ids": choice.ids, "bits": choice.bits,
+            "family": tracked.choice.as_ref().map(|choice| json!({
+                "name": choice.code.name(), "ids": choice.ids, "bits": choice.bits,
+                "patterns": match &choice.code {
+                    Code::Family(_) => Value::Null,
+                    Code::Patterns(patterns) => {
+                        json!({ "list": patterns.list(), "share": patterns.share() })
+                    }
+                },
             })),
             "learnt_from_frames": tracked.learnt_from,
             "camera": self.camera(),
@@ -144,6 +151,12 @@ impl Session {
                     }
                     _ => Value::Null,
                 },
+                "charuco": match tracked.board.kind {
+                    BoardKind::Charuco { columns, rows, square_m, is_legacy } => {
+                        json!({ "columns": columns, "rows": rows, "square_m": square_m, "legacy": is_legacy })
+                    }
+                    _ => Value::Null,
+                },
                 "first_point_of_marker": tracked.board.markers,
                 "points_m": solution.points.iter().map(|p| p.to_array()).collect::<Vec<_>>(),
             },
@@ -157,10 +170,12 @@ impl Session {
         let tracked = &self.tracked;
         let solution = &tracked.solution;
         let mut lines = Vec::new();
-        match tracked.choice {
+        match &tracked.choice {
             Some(choice) => lines.push(format!(
                 "markers: {}, {} ids, by {:.0} bits beyond chance",
-                choice.family.name, choice.ids, choice.bits
+                choice.code.name(),
+                choice.ids,
+                choice.bits
             )),
             None => lines.push("markers: a chessboard's corners".to_owned()),
         }

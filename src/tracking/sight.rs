@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec2;
 
 use super::TrackError;
-use super::choice::choose_family;
+use super::choice::choose_code;
 use super::light::{LightImage, Luma, Tone};
 use super::line::Line;
 use super::marker::find_markers;
@@ -37,10 +37,13 @@ pub fn sight_markers(path: &Path, ids: [u32; 2]) -> Result<Vec<Sighting>, TrackE
         }
     }
     let lumas: Vec<Luma> = frames.iter().map(|(_, luma)| luma.clone()).collect();
-    let family = choose_family(&lumas, None)?.family;
+    let code = choose_code(&lumas, None)?.code;
     let mut sightings = Vec::new();
     for (name, luma) in frames {
-        let seen = find_markers(&LightImage::of(&luma, Tone::Srgb), &[family]);
+        let seen = find_markers(
+            &LightImage::of(&luma, Tone::Srgb),
+            std::slice::from_ref(&code),
+        );
         for marker in seen.markers.iter().filter(|m| ids.contains(&m.id)) {
             let Some(pixel) = middle(&marker.corners) else {
                 continue;

@@ -10,11 +10,14 @@ use crate::support::{Folder, stderr};
 const BOARD: &str =
     "family = \"apriltag-36h11\"\n[grid]\ncolumns = 4\nrows = 3\nside_m = 0.04\ngap_m = 0.02\n";
 
+/// As OpenCV has it, whose pixel centres count from 0.
+pub const LENS_OF_THE_FILM: &str = "%YAML:1.0\nimage_width: 480\nimage_height: 360\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 520., 0., 235.5, 0., 519., 183.5, 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.2, 0.1, 0., 0., 0. ]\n";
+
 fn tags() -> &'static Family {
     Family::named("apriltag-36h11").unwrap()
 }
 
-fn pose(frame: &Value) -> DMat4 {
+pub fn pose(frame: &Value) -> DMat4 {
     let number =
         |row: usize, column: usize| frame["world_from_camera"][row][column].as_f64().unwrap();
     DMat4::from_cols_array_2d(&std::array::from_fn(|column| {
@@ -23,7 +26,7 @@ fn pose(frame: &Value) -> DMat4 {
 }
 
 /// Millimetres between the eyes, degrees between the views.
-fn off(pose: &DMat4, truth: &View) -> (f64, f64) {
+pub fn off(pose: &DMat4, truth: &View) -> (f64, f64) {
     let eye = -(truth.rotation.transpose() * truth.translation);
     let along = truth.rotation.transpose() * DVec3::Z;
     let own = pose.transform_vector3(DVec3::NEG_Z);
@@ -72,6 +75,28 @@ fn poses_lens_and_gamma_of_a_known_camera() {
     assert_eq!(again["camera"]["cx"], poses["camera"]["cx"]);
     let (mm, _) = off(&pose(&again["frames"][0]), &film.views[0]);
     assert!(mm < 1.0, "{mm}");
+}
+
+#[test]
+fn barcodes_of_artoolkit_are_told_from_those_that_they_are_part_of() {
+    let folder = Folder::new();
+    let film = Film::around();
+    for name in [
+        "artoolkit-3x3-parity",
+        "artoolkit-4x4",
+        "artoolkit-4x4-bch-13-9-3",
+        "artoolkit-5x5-bch-22-7-7",
+    ] {
+        let family = Family::named(name).unwrap();
+        film.save(&folder, "film.y4m", &markers(family, 4, 3, 0.05, 0.01));
+        let said = folder.succeed("track film.y4m --marker-size 50mm --gamma 2.2 -o poses.json");
+        assert!(said.contains(&format!("{name}, 12 ids")), "{said}");
+    }
+    // Its words under another name.
+    folder.refuse(
+        "track film.y4m --marker-size 50mm --family aruco-5x5 -o poses.json",
+        "give --family artoolkit-5x5-bch-22-7-7",
+    );
 }
 
 #[test]
@@ -288,11 +313,7 @@ fn poses_are_smoothed_within_their_covariances_where_that_is_asked_for() {
         .collect();
     film.save(&folder, "film.y4m", &markers(tags(), 4, 3, 0.04, 0.02));
     folder.write("board.toml", BOARD);
-    let calibration = format!(
-        "%YAML:1.0\nimage_width: 480\nimage_height: 360\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 520., 0., {}, 0., 519., {}, 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.2, 0.1, 0., 0., 0. ]\n",
-        235.5, 183.5
-    );
-    folder.write("lens.yaml", calibration);
+    folder.write("lens.yaml", LENS_OF_THE_FILM);
     let line = "track film.y4m --board board.toml --board-flatness rigid --gamma 2.2 --intrinsics lens.yaml --fix-intrinsics";
     folder.succeed(&format!("{line} -o own.json"));
     let said = folder.succeed(&format!("{line} --smooth -o smooth.json"));

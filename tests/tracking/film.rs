@@ -18,14 +18,18 @@ pub struct Film {
     pub width: usize,
     pub height: usize,
     pub gamma: f64,
+    /// Of a Gaussian besides the pixels' own, one standard deviation.
+    pub blur_px: f64,
+    /// Of the codes, one standard deviation.
+    pub noise: f64,
     pub views: Vec<View>,
 }
 
 /// What is printed at a place of the board's plane: x and z, metres; reflectance.
 pub type Print<'a> = &'a dyn Fn(DVec2) -> f64;
 
-const PAPER: f64 = 0.85;
-const INK: f64 = 0.06;
+pub const PAPER: f64 = 0.85;
+pub const INK: f64 = 0.06;
 /// Of the table around the paper.
 const TABLE: f64 = 0.25;
 
@@ -48,6 +52,8 @@ impl Film {
             width: 480,
             height: 360,
             gamma: 2.2,
+            blur_px: 0.0,
+            noise: 1.0,
             views: views.collect(),
         }
     }
@@ -82,6 +88,7 @@ impl Film {
             bytes.extend(b"FRAME\n");
             let back = view.rotation.transpose();
             let eye = -(back * view.translation);
+            let mut lights = Vec::with_capacity(self.width * self.height);
             for row in 0..self.height {
                 for column in 0..self.width {
                     let mut light = 0.0;
@@ -97,10 +104,12 @@ impl Film {
                             };
                         }
                     }
-                    let light = 0.9 * light / (SIDE * SIDE) as f64;
-                    let code = 255.0 * light.powf(1.0 / self.gamma) + random.normal();
-                    bytes.push(code.round().clamp(0.0, 255.0) as u8);
+                    lights.push(0.9 * light / (SIDE * SIDE) as f64);
                 }
+            }
+            for light in blurred(&lights, self.width, self.blur_px) {
+                let code = 255.0 * light.powf(1.0 / self.gamma) + self.noise * random.normal();
+                bytes.push(code.round().clamp(0.0, 255.0) as u8);
             }
             bytes.extend(vec![
                 128;
@@ -109,6 +118,32 @@ impl Film {
         }
         folder.write(name, bytes);
     }
+}
+
+/// Along rows, then along columns; the edge's value beyond.
+fn blurred(lights: &[f64], width: usize, sigma_px: f64) -> Vec<f64> {
+    if sigma_px == 0.0 {
+        return lights.to_vec();
+    }
+    let reach = (3.0 * sigma_px).ceil() as isize;
+    let weights: Vec<f64> = (-reach..=reach)
+        .map(|k| (-0.5 * (k as f64 / sigma_px).powi(2)).exp())
+        .collect();
+    let total: f64 = weights.iter().sum();
+    let height = lights.len() / width;
+    let along = |from: &[f64], step: (isize, isize)| -> Vec<f64> {
+        let places = (0..height as isize).flat_map(|y| (0..width as isize).map(move |x| (x, y)));
+        let sum = |(x, y): (isize, isize)| {
+            let each = weights.iter().zip(-reach..).map(|(weight, k)| {
+                let column = (x + k * step.0).clamp(0, width as isize - 1);
+                let row = (y + k * step.1).clamp(0, height as isize - 1);
+                weight * from[row as usize * width + column as usize]
+            });
+            each.sum::<f64>() / total
+        };
+        places.map(sum).collect()
+    };
+    along(&along(lights, (1, 0)), (0, 1))
 }
 
 /// From above the board's middle, gone aside.
@@ -138,6 +173,25 @@ pub fn markers(
     side_m: f64,
     gap_m: f64,
 ) -> impl Fn(DVec2) -> f64 {
+    squares((columns, rows), (side_m, gap_m), move |id, inside| {
+        let bit = inside * family.side_cells() - family.border;
+        let n = family.cells as f64;
+        if bit.cmplt(DVec2::ZERO).any() || bit.cmpge(DVec2::splat(n)).any() {
+            return INK;
+        }
+        match family.is_white(id as u32, bit.x as usize, bit.y as usize) {
+            true => PAPER,
+            false => INK,
+        }
+    })
+}
+
+/// A grid of squares of which `inside` tells the reflectance, by their numbers and places from 0 to 1.
+pub fn squares(
+    (columns, rows): (usize, usize),
+    (side_m, gap_m): (f64, f64),
+    inside: impl Fn(usize, DVec2) -> f64,
+) -> impl Fn(DVec2) -> f64 {
     move |at| {
         let pitch = side_m + gap_m;
         let size = DVec2::new(columns as f64, rows as f64) * pitch;
@@ -146,23 +200,14 @@ pub fn markers(
             return TABLE;
         }
         let cell = (place / pitch).floor();
-        let inside = (place - cell * pitch) / side_m;
+        let within = (place - cell * pitch) / side_m;
         let is_marker = cell.cmpge(DVec2::ZERO).all()
             && cell.x < columns as f64
             && cell.y < rows as f64
-            && inside.cmplt(DVec2::ONE).all();
+            && within.cmplt(DVec2::ONE).all();
         if !is_marker {
             return PAPER;
         }
-        let bit = inside * family.side_cells() - family.border;
-        let n = family.cells as f64;
-        if bit.cmplt(DVec2::ZERO).any() || bit.cmpge(DVec2::splat(n)).any() {
-            return INK;
-        }
-        let id = cell.y as u32 * columns as u32 + cell.x as u32;
-        match family.is_white(id, bit.x as usize, bit.y as usize) {
-            true => PAPER,
-            false => INK,
-        }
+        inside(cell.y as usize * columns + cell.x as usize, within)
     }
 }

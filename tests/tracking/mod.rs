@@ -1,7 +1,9 @@
 //! Camera poses from markers and chessboards: known cameras, real videos, and what must be refused.
 
+mod charuco;
 mod commands;
 pub mod film;
+mod patterns;
 mod photographs;
 mod scale;
 mod videos;

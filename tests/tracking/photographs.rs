@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use mixray::scene::Photo;
-use mixray::tracking::{Flatness, Luma, Target, Tone, TrackOptions, prepare};
+use mixray::tracking::{Flatness, Luma, Target, Tone, TrackOptions, prepare, read_patterns};
 use mixray::video::{FrameSource, Taken};
 
+use super::patterns::prepared;
 use crate::support::shared_data;
 
 fn pictures(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -48,20 +49,29 @@ fn no_marker_is_invented() {
     assert!(lumas.len() >= 200, "{}", lumas.len());
     let options = TrackOptions {
         target: Target::Markers { side_m: 0.04 },
-        family: None,
+        code: None,
         lens: None,
         fix_lens: false,
         tone: Some(Tone::Srgb),
         flatness: Flatness::RIGID,
     };
+    let folder = prepared();
+    let files = ["f.patt", "ring.patt", "steps.patt", "strokes.patt"];
+    let files = files.map(|name| folder.path(name));
+    let patterns = TrackOptions {
+        code: Some(read_patterns(&files, 0.5).unwrap()),
+        ..options.clone()
+    };
     for luma in lumas {
-        let found = prepare(&options, std::slice::from_ref(&luma));
-        assert!(
-            found.is_err(),
-            "{:?} in a picture of {} x {}",
-            found.unwrap().1,
-            luma.width,
-            luma.height
-        );
+        for options in [&options, &patterns] {
+            let found = prepare(options, std::slice::from_ref(&luma));
+            assert!(
+                found.is_err(),
+                "{:?} in a picture of {} x {}",
+                found.unwrap().1,
+                luma.width,
+                luma.height
+            );
+        }
     }
 }
