@@ -3,7 +3,9 @@
 mod composing;
 mod files;
 mod gizmo;
+mod layout;
 mod random_walk;
+mod real_window;
 mod stages;
 mod timeline;
 
