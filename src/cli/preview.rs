@@ -37,7 +37,10 @@ mod window {
     use super::{Failure, Outcome};
     use crate::cli::terminal::{print, say};
     use crate::cli::threads::ThreadsFlag;
+    use crate::preview::frames::Frames;
+    use crate::preview::session::Session;
     use crate::preview::{headless, script, window};
+    use crate::scene::trajectory::FORMATS;
 
     /// Opens a window on a scene, in which it is composed
     ///
@@ -52,6 +55,11 @@ mod window {
         /// Run the steps of this file without a display, and end (see docs/preview.md)
         #[arg(long, value_name = "FILE")]
         headless_script: Option<PathBuf>,
+        /// Folder of a video's frames, for a timeline; with --trajectory
+        #[arg(long, value_name = "FOLDER", requires = "trajectory")]
+        frames: Option<PathBuf>,
+        #[arg(long, value_name = "FILE", requires = "frames", help = format!("Poses of the frames: {FORMATS}"))]
+        trajectory: Option<PathBuf>,
         #[command(flatten)]
         threads: ThreadsFlag,
     }
@@ -59,8 +67,12 @@ mod window {
     pub(in crate::cli) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         arguments.threads.start()?;
         let frame_time = Duration::from_secs(1) / arguments.fps;
+        let frames = match (&arguments.frames, &arguments.trajectory) {
+            (Some(folder), Some(poses)) => Some(Frames::open(folder, poses).map_err(Failure)?),
+            _ => None,
+        };
         let Some(path) = &arguments.headless_script else {
-            window::run(&arguments.scene, frame_time)?;
+            window::run(&arguments.scene, frames, frame_time)?;
             return Ok(Outcome::Done);
         };
         let name = path.display();
@@ -75,7 +87,12 @@ mod window {
             // A closed pipe ends nothing here.
             let _ = print(text);
         };
-        match headless::run(&arguments.scene, &steps, frame_time, &mut tell) {
+        let mut session = Session::open(&arguments.scene, frame_time, || ())
+            .map_err(|error| Failure(error.to_string()))?;
+        if let Some(frames) = frames {
+            session.follow(frames);
+        }
+        match headless::run_on(session, &steps, &mut tell) {
             Ok(()) => Ok(Outcome::Done),
             Err(failed) => {
                 let message = format!("{name}:{}: {}", failed.line, failed.problem);

@@ -5,7 +5,8 @@
 
 use glam::{DMat3, DMat4, DQuat, DVec3, EulerRot};
 
-use crate::scene::{Aperture, Exposure, Lens, Scene, Side};
+use super::material_form::MaterialForm;
+use crate::scene::{Aperture, Exposure, Lens, Scene, Shutter, Side, Stages};
 
 /// All that can be edited.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +21,11 @@ pub struct Composition {
     pub seed: u32,
     /// In the order of [`Scene::objects`]: the real ones first.
     pub objects: Vec<Placement>,
+    /// In the same order; `None`: the file replaces nothing of what the object brings.
+    pub materials: Vec<Option<MaterialForm>>,
+    pub stages: Stages,
+    /// `None`: nothing moves while the picture is taken.
+    pub shutter: Option<Shutter>,
 }
 
 /// World-from-camera.
@@ -178,6 +184,10 @@ pub struct Difference {
     pub transport: bool,
     pub samples: bool,
     pub objects: Vec<usize>,
+    /// What works on the finished film alone.
+    pub stages: bool,
+    /// What no renderer takes up: it is built anew.
+    pub built: bool,
 }
 
 impl Difference {
@@ -193,11 +203,22 @@ impl Difference {
                 .filter(|(_, (a, b))| a != b)
                 .map(|(index, _)| index)
                 .collect(),
+            stages: a.stages != b.stages,
+            built: (&a.materials, a.shutter) != (&b.materials, b.shutter),
         }
     }
 
     pub fn is_none(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// The film serves both: nothing differs, or the stages alone.
+    pub fn keeps_film(&self) -> bool {
+        let stages = Self {
+            stages: true,
+            ..Self::default()
+        };
+        self.is_none() || *self == stages
     }
 
     /// For figures of latency.
@@ -213,6 +234,8 @@ impl Difference {
                 transport: true, ..
             } => "exposure or bounces",
             Self { samples: true, .. } => "rays",
+            Self { built: true, .. } => "material or shutter",
+            Self { stages: true, .. } => "stages",
             _ => "none",
         }
     }
@@ -235,14 +258,29 @@ impl Composition {
                 object.world_from_object = placement.world_from_object();
             }
         }
+        for (object, form) in scene.objects.iter_mut().zip(&self.materials) {
+            if let Some(form) = form {
+                form.apply(object);
+            }
+        }
+        scene.stages = self.stages.clone();
+        scene.shutter = self.shutter;
     }
 
-    /// Objects that move have keys after their own transform: they are read anew from the text.
+    /// Objects that move have keys after their own transform, and another time moves all that has keys: the text is read anew.
     pub fn needs_reading(&self, other: &Self, scene: &Scene) -> bool {
+        if self.time_secs() != other.time_secs() {
+            return true;
+        }
         let changed = Difference::between(self, other).objects;
         changed
             .into_iter()
             .any(|index| scene.objects[index].is_animated())
+    }
+
+    /// The picture's time.
+    pub fn time_secs(&self) -> f64 {
+        self.shutter.map_or(0.0, |shutter| shutter.time_secs)
     }
 }
 

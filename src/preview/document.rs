@@ -1,5 +1,8 @@
 //! The scene file's text, edited in place: comments, order and everything that was not changed stay as they are.
 
+mod materials;
+mod stages;
+
 use std::path::Path;
 
 use glam::{DMat4, DQuat, DVec3};
@@ -8,6 +11,7 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Tab
 use super::composition::{
     CameraPose, Composition, EnvironmentForm, LensForm, Opening, Placement, Rotation,
 };
+use super::material_form::MaterialForm;
 use crate::scene::{Aperture, Exposure, Scene, Side};
 
 /// Keys that place an object in place of numbers.
@@ -30,21 +34,18 @@ impl Document {
 
     /// What the text says, of a scene that was read from it.
     pub fn composition(&self, scene: &Scene) -> Composition {
-        let (mut real, mut added) = (0, 0);
-        let objects = scene.objects.iter().map(|object| {
-            let (key, index) = match object.side {
-                Side::Real => ("real", &mut real),
-                Side::Virtual => ("virtual", &mut added),
-            };
-            let table = self.entry(key, *index);
-            *index += 1;
-            match table {
+        let (mut objects, mut materials) = (Vec::new(), Vec::new());
+        for (object, (key, index)) in scene.objects.iter().zip(entries(scene)) {
+            let table = self.entry(key, index);
+            objects.push(match table {
                 Some(table) if is_placed(table) => Placement::of(object.world_from_object),
                 Some(table) => read_placement(table),
                 None => Placement::IDENTITY,
-            }
-        });
-        let objects = objects.collect();
+            });
+            let is_given = table.is_some_and(|table| table.contains_key("material"));
+            let first = object.instances.first().filter(|_| is_given);
+            materials.push(first.map(|part| MaterialForm::of(&part.material)));
+        }
         Composition {
             camera: self.camera(scene),
             lens: self.lens(scene),
@@ -57,6 +58,9 @@ impl Document {
             max_bounces: scene.settings.max_bounces,
             seed: scene.settings.seed,
             objects,
+            materials,
+            stages: scene.stages.clone(),
+            shutter: scene.shutter,
         }
     }
 
@@ -161,19 +165,18 @@ impl Document {
                 set(self.table_mut("render"), key, i64::from(is));
             }
         }
-        let (mut real, mut added) = (0, 0);
-        for (index, object) in scene.objects.iter().enumerate() {
-            let (key, place) = match object.side {
-                Side::Real => ("real", &mut real),
-                Side::Virtual => ("virtual", &mut added),
+        self.write_shutter(was.shutter, is.shutter);
+        self.write_stages(&was.stages, &is.stages);
+        for (index, (key, place)) in entries(scene).enumerate() {
+            let Some(table) = self.entry_mut(key, place) else {
+                continue;
             };
-            let (was, is) = (was.objects[index], is.objects[index]);
-            if was != is
-                && let Some(table) = self.entry_mut(key, *place)
-            {
-                write_placement(table, &was, &is);
+            if was.objects[index] != is.objects[index] {
+                write_placement(table, &was.objects[index], &is.objects[index]);
             }
-            *place += 1;
+            if was.materials[index] != is.materials[index] {
+                materials::write(table, was.materials[index], is.materials[index]);
+            }
         }
     }
 
@@ -317,6 +320,19 @@ impl Placement {
     }
 }
 
+/// Where the objects of a scene stand in its file: the list, and the number in it.
+fn entries(scene: &Scene) -> impl Iterator<Item = (&'static str, usize)> {
+    let [mut real, mut added] = [0, 0];
+    scene.objects.iter().map(move |object| {
+        let (key, count) = match object.side {
+            Side::Real => ("real", &mut real),
+            Side::Virtual => ("virtual", &mut added),
+        };
+        *count += 1;
+        (key, *count - 1)
+    })
+}
+
 /// Its transform follows from what is around it.
 fn is_placed(table: &dyn TableLike) -> bool {
     PLACING_KEYS.iter().any(|key| table.contains_key(key))
@@ -407,108 +423,4 @@ fn set(table: &mut dyn TableLike, key: &str, value: impl Into<Value>) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::load_text;
-
-    const TEXT: &str = "\
-# my desk
-[camera] # from the calibration
-width = 32
-height = 24
-vertical_fov_deg = 40
-position = [0, 1, 3] # metres
-look_at = [0, 0, 0]
-
-[lens]
-f_number = 1.8 # wide open
-focal_length_mm = 50
-focus_distance_m = 3
-
-[environment]
-radiance = [1, 1, 1]
-
-[[virtual]]   # the ball
-shape = \"sphere\"
-translation = [0.1, 0.05, -0.2] # where it lies
-rotation_deg = [0, 30, 0]
-
-[render] # fast
-rays_per_pixel = 4
-";
-
-    #[test]
-    fn edits_keep_comments_and_read_back_as_the_same_scene() {
-        let path = Path::new("scene.toml");
-        let scene = load_text(path, TEXT).unwrap();
-        let mut document = Document::parse(TEXT).unwrap();
-        let was = document.composition(&scene);
-        let mut same = document.clone();
-        same.write(&was, &was, &scene);
-        assert_eq!(same.text(), TEXT, "nothing changed");
-
-        let mut is = was.clone();
-        is.lens.opening = Opening::FNumber {
-            f_number: 5.6,
-            focal_length_mm: 50.0,
-        };
-        is.lens.focus_distance_m = 2.345;
-        is.objects[0].translation.x = 0.123_45;
-        is.objects[0].rotation = Rotation::EulerDeg(DVec3::new(0.1, 31.7, 0.0));
-        is.camera = CameraPose::LookAt {
-            position: DVec3::new(0.3, 1.1, 3.0),
-            look_at: DVec3::ZERO,
-            up: DVec3::Y,
-        };
-        is.environment = Some(EnvironmentForm {
-            rotation_deg: 12.5,
-            scale: 1.7,
-        });
-        is.rays_per_pixel = 9;
-        document.write(&was, &is, &scene);
-        let text = document.text();
-        for kept in [
-            "# my desk",
-            "[camera] # from the calibration",
-            "position = [0.3, 1.1, 3.0] # metres",
-            "f_number = 5.6 # wide open",
-            "[[virtual]]   # the ball",
-            "translation = [0.12345, 0.05, -0.2] # where it lies",
-            "[render] # fast",
-        ] {
-            assert!(text.contains(kept), "{kept}:\n{text}");
-        }
-        let read = load_text(path, &text).unwrap();
-        let mut applied = scene.clone();
-        is.apply(&mut applied);
-        let facts = |scene: &Scene| {
-            format!(
-                "{:?} {:?} {:?} {:?}",
-                scene.camera, scene.lens, scene.objects[0].world_from_object, scene.settings
-            )
-        };
-        assert_eq!(facts(&read), facts(&applied));
-        assert_ne!(facts(&read), facts(&scene), "control");
-        assert_eq!(document.composition(&read), is);
-    }
-
-    #[test]
-    fn objects_come_and_go() {
-        let mut document = Document::parse(TEXT).unwrap();
-        document.add_mesh("knot.glb", &Placement::IDENTITY);
-        assert!(
-            document.text().contains("[[virtual]]\nmesh = \"knot.glb\""),
-            "{}",
-            document.text()
-        );
-        document.remove_virtual(1);
-        assert_eq!(document.text(), TEXT);
-    }
-
-    #[test]
-    fn files_are_named_as_the_scene_sees_them() {
-        let name = |file: &str| name_of(Path::new(file), Path::new("/a/scene.toml"));
-        assert_eq!(name("/a/b/c.glb"), "b/c.glb");
-        assert_eq!(name("/d/c.glb"), "/d/c.glb");
-    }
-}
+mod tests;

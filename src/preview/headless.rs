@@ -1,18 +1,21 @@
 //! Runs a script on the window's own code, without a display.
 
-use std::path::{Path, PathBuf};
+mod measure;
+
+use std::path::Path;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use eframe::egui::{self, Event, Key, Modifiers, MouseWheelUnit, PointerButton, TouchPhase};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
-use super::composition::rounded;
+use super::quantity::decimal;
 use super::render_threads::{Level, Shown};
-use super::script::{Expectation, Held, Line, Quantity, Step};
+use super::script::{Expectation, Held, Line, Step};
 use super::session::Session;
+use super::still::{Still, StillState};
 use super::window::App;
 use crate::film::Picture;
 use crate::output::{PngBits, Target, write_png};
@@ -24,6 +27,7 @@ use crate::stages::finish;
 const PATIENCE: Duration = Duration::from_secs(600);
 /// Between two frames while something is waited for, as on a screen: drawing more often would take the processors from what renders.
 const FRAME: Duration = Duration::from_millis(16);
+const NO_FRAMES: &str = "there are no frames; expected --frames and --trajectory; give them";
 const SIZE: [f32; 2] = [1240.0, 760.0];
 
 /// A step that failed.
@@ -46,7 +50,25 @@ pub fn run(
 ) -> Result<(), Failed> {
     let at = |line| move |problem| Failed { line, problem };
     let session = Session::open(scene, frame_time, || ());
-    let session = session.map_err(|error| at(0)(error.to_string()))?;
+    run_on(
+        session.map_err(|error| at(0)(error.to_string()))?,
+        steps,
+        tell,
+    )
+}
+
+/// The same on a session that may follow the frames of a video.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_on(
+    mut session: Session,
+    steps: &[Line],
+    tell: &mut dyn FnMut(&str),
+) -> Result<(), Failed> {
+    let at = |line| move |problem| Failed { line, problem };
+    // What a script leaves unsaved is nobody's work.
+    session.keep_no_unsaved_work();
     let mut window = Window::new(App::new(session));
     window.wait_for_scene().map_err(at(0))?;
     for Line { number, step } in steps {
@@ -240,16 +262,59 @@ impl Window {
             Step::Click(pixel) => self.click(*pixel),
             Step::Hover(pixel) => self.harness.hover_at(self.place(*pixel)),
             Step::Drag(from, to) => self.drag(*from, *to),
+            Step::Select(name) => {
+                let object = self.object(name)?;
+                self.harness.state_mut().select(Some(object));
+                self.frame();
+            }
+            Step::Pull(handle, by) => {
+                let grip = self.app().grip(*handle);
+                let grip =
+                    grip.ok_or("no object with a gizmo is selected; expected one; click it first")?;
+                let to = grip + DVec2::from(*by);
+                self.drag(grip.to_array(), to.to_array());
+            }
             Step::Wheel(pixel, notches, held) => self.wheel(*pixel, *notches, *held),
             Step::Key(name, held) => self.key(name, *held)?,
             Step::Press(label) => self.press(label)?,
             Step::Set(quantity, value) => self.session_mut().edit("set", |composition| {
                 quantity.set(composition, *value);
             }),
+            Step::Material(name, number, value) => {
+                let object = self.object(name)?;
+                self.session_mut().edit("set", |composition| {
+                    if let Some(form) = &mut composition.materials[object] {
+                        number.set(form, *value as f32);
+                    }
+                });
+            }
             Step::View(view) => self.session_mut().set_view(*view),
             Step::Drop(file) => {
                 self.session_mut().take_file(file, None);
                 self.wait_for_scene()?;
+            }
+            Step::Frame(number) => {
+                let frames = self.session().frames().ok_or(NO_FRAMES)?;
+                let place = frames.posed().iter().position(|f| f.number == *number);
+                let place = place.ok_or_else(|| {
+                    format!("there is no frame {number} with a pose; expected one of the folder; correct it")
+                })?;
+                self.session_mut().go_to_frame(place);
+                self.wait_for_scene()?;
+            }
+            Step::Range(from, to, output) => {
+                self.session_mut()
+                    .render_range((*from, *to), output.clone());
+                self.wait_until("the range", |session| {
+                    !matches!(
+                        session.still().map(Still::state),
+                        None | Some(StillState::Rendering(_))
+                    )
+                })?;
+                if let Some(StillState::Failed(problem)) = self.session().still().map(Still::state)
+                {
+                    return Err(problem);
+                }
             }
             Step::Undo => self.session_mut().undo(),
             Step::Redo => self.session_mut().redo(),
@@ -263,8 +328,19 @@ impl Window {
             Step::Picture(path) => self.picture(path)?,
             Step::Measure(edits) => tell(&self.measure(*edits)?),
         }
-        if matches!(step, Step::Set(..) | Step::Undo | Step::Redo) {
+        if matches!(
+            step,
+            Step::Set(..) | Step::Material(..) | Step::Undo | Step::Redo
+        ) {
             self.session_mut().end_gesture();
+        }
+        // Another time, and what has keys, are read anew.
+        let may_read = matches!(
+            step,
+            Step::Set(..) | Step::Press(_) | Step::Pull(..) | Step::Undo | Step::Redo
+        );
+        if may_read && self.session().is_reading() {
+            self.wait_for_scene()?;
         }
         self.frame();
         Ok(())
@@ -285,10 +361,28 @@ impl Window {
                 }
                 true
             }
+            Expectation::Material(name, number, value) => {
+                let form = composition.materials[self.object(name)?];
+                let is = form.map(|form| decimal(number.of(&form)));
+                if !is.is_some_and(|is| (is - value).abs() <= 1e-5) {
+                    let is = is.map_or("the mesh's own".to_owned(), |is| is.to_string());
+                    return Err(format!(
+                        "it is {is}; expected {value}; see the steps before"
+                    ));
+                }
+                true
+            }
+            Expectation::Position(name, point, within) => {
+                let is = composition.objects[self.object(name)?].translation;
+                if !((is - DVec3::from(*point)).length() <= *within) {
+                    return Err(format!(
+                        "`{name}` is at {is}; expected {point:?} within {within} m; see the steps before"
+                    ));
+                }
+                true
+            }
             Expectation::Rests(name, within) => {
-                let object = session.object(name).ok_or_else(|| {
-                    format!("no virtual object is called `{name}`; expected a name or number; correct it")
-                })?;
+                let object = self.object(name)?;
                 let gap = session
                     .loaded()
                     .and_then(|l| l.geometry.gap_m(composition, object));
@@ -299,6 +393,10 @@ impl Window {
                     ));
                 }
                 true
+            }
+            Expectation::Frame(number) => {
+                let frames = session.frames().ok_or(NO_FRAMES)?;
+                frames.posed()[session.frame()].number == *number
             }
             Expectation::Saved => !session.is_dirty(),
             Expectation::Unsaved => session.is_dirty(),
@@ -313,6 +411,12 @@ impl Window {
                 "{expectation:?} does not hold; see the steps before"
             )),
         }
+    }
+
+    fn object(&self, name: &str) -> Result<usize, String> {
+        self.session().object(name).ok_or_else(|| {
+            format!("no virtual object is called `{name}`; expected a name or number; correct it")
+        })
     }
 
     /// Renders the file anew and compares every bit.
@@ -353,121 +457,6 @@ impl Window {
             linear: photo.linear,
         };
         write_png(&target, &picture, None, PngBits::Eight).map_err(|error| error.to_string())
-    }
-
-    /// From edits to the pictures that show them first, as a Markdown table.
-    fn measure(&mut self, edits: u32) -> Result<String, String> {
-        let objects = self
-            .session()
-            .loaded()
-            .map(|loaded| super::composition::virtual_objects(&loaded.scene).next());
-        let object = objects.flatten();
-        self.wait_for_picture(Some(1))?;
-        for kind in 0..4 {
-            for n in 0..edits {
-                let step = f64::from(n % 7) * 0.01 + 0.01;
-                self.session_mut()
-                    .edit("measure", |composition| match kind {
-                        0 => composition.lens.focus_distance_m = rounded(0.7 + step, 1e-4),
-                        1 => {
-                            if let Some(form) = &mut composition.environment {
-                                form.rotation_deg = rounded(100.0 * step, 0.01);
-                            }
-                        }
-                        2 => {
-                            if let Some(object) = object {
-                                composition.objects[object].translation.x = rounded(step, 1e-5);
-                            }
-                        }
-                        _ => Quantity::Exposure.set(composition, step),
-                    });
-                self.wait_for_coarse()?;
-            }
-        }
-        let added = self.measure_files(&["glb", "gltf"], true)?;
-        let swapped = self.measure_files(&["png", "jpg", "jpeg", "webp"], false)?;
-        let longest_ms = 1e3 * self.app().longest_frame.as_secs_f64();
-        let latencies = self.session().renderers().latencies();
-        let mut table = String::from(
-            "| edit | edits | median, ms | p95, ms | of the processors, median, ms |\n| --- | --- | --- | --- | --- |\n",
-        );
-        let mut row = |name: &str, times: Option<Spread>, processors: Option<Spread>| {
-            if let Some(times) = times {
-                let processors =
-                    processors.map_or("".to_owned(), |p| format!("{:.0}", p.median_ms));
-                table += &format!(
-                    "| {name} | {} | {:.0} | {:.0} | {processors} |\n",
-                    times.count, times.median_ms, times.p95_ms
-                );
-            }
-        };
-        for change in ["lens", "light", "object", "exposure or bounces"] {
-            let of_change = || {
-                let all = latencies.iter();
-                all.filter(|latency| latency.change == change && latency.level == Level::Coarse)
-            };
-            let times = Spread::of(of_change().map(|latency| latency.time));
-            let processors = Spread::of(of_change().map(|latency| latency.processor_time));
-            row(change, times, processors);
-        }
-        row("object added", Spread::of(added.into_iter()), None);
-        row("photograph swapped", Spread::of(swapped.into_iter()), None);
-        let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
-        let load = load.split(' ').next().unwrap_or_default();
-        Ok(table
-            + &format!(
-                "\nlongest frame of the window: {longest_ms:.0} ms; load of the machine: {load}\n"
-            ))
-    }
-
-    /// From files that are dropped, one of the scene's own with such an ending, to the pictures that show them first; `undone`: each is taken out
-    /// again.
-    fn measure_files(&mut self, endings: &[&str], undone: bool) -> Result<Vec<Duration>, String> {
-        const FILES: usize = 5;
-        let loaded = self.session().loaded().ok_or("no scene is read")?;
-        let has_ending = |file: &&PathBuf| {
-            let ending = file.extension().map(|e| e.to_string_lossy().to_lowercase());
-            ending.is_some_and(|ending| endings.contains(&&*ending))
-        };
-        let Some(file) = loaded.scene.inputs.iter().find(has_ending).cloned() else {
-            return Ok(Vec::new());
-        };
-        let mut times = Vec::new();
-        for _ in 0..FILES {
-            let begin = Instant::now();
-            self.session_mut().take_file(&file, None);
-            self.wait_for_scene()?;
-            self.wait_for_coarse()?;
-            times.push(begin.elapsed());
-            if undone {
-                self.session_mut().undo();
-                self.wait_for_scene()?;
-                self.wait_for_coarse()?;
-            }
-        }
-        Ok(times)
-    }
-}
-
-/// Of some times.
-struct Spread {
-    count: usize,
-    median_ms: f64,
-    p95_ms: f64,
-}
-
-impl Spread {
-    /// `None` of none.
-    fn of(times: impl Iterator<Item = Duration>) -> Option<Self> {
-        let mut ms: Vec<f64> = times.map(|time| 1e3 * time.as_secs_f64()).collect();
-        ms.sort_by(f64::total_cmp);
-        let last = ms.len().checked_sub(1)?;
-        let at = |share: f64| ms[(last as f64 * share).round() as usize];
-        Some(Self {
-            count: ms.len(),
-            median_ms: at(0.5),
-            p95_ms: at(0.95),
-        })
     }
 }
 

@@ -5,10 +5,14 @@
 
 pub mod composition;
 pub mod document;
+pub mod frames;
 pub mod geometry;
+pub mod gizmo;
 pub mod headless;
 pub mod history;
 pub mod manipulate;
+pub mod material_form;
+pub mod quantity;
 pub mod render_threads;
 pub mod script;
 pub mod session;

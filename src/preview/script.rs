@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::composition::{Composition, EnvironmentForm, Opening};
+use super::gizmo::Handle;
+use super::material_form::MaterialNumber;
+use super::quantity::Quantity;
 use super::view::View;
-use crate::scene::{Choice, Exposure};
+use crate::scene::Choice;
 
 /// A step and its line, from 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +27,10 @@ pub enum Step {
     Wait(Option<u32>),
     Click([f64; 2]),
     Drag([f64; 2], [f64; 2]),
+    /// An object by its name or number.
+    Select(String),
+    /// A handle of the selected object's gizmo is dragged by so many pixels.
+    Pull(Handle, [f64; 2]),
     Wheel([f64; 2], f32, Held),
     /// The pointer rests there.
     Hover([f64; 2]),
@@ -33,9 +39,15 @@ pub enum Step {
     /// A button or label of that name is clicked.
     Press(String),
     Set(Quantity, f64),
+    /// Of the material that the scene file gives an object.
+    Material(String, MaterialNumber, f64),
     View(View),
     /// As if it were dropped on the window.
     Drop(PathBuf),
+    /// Of the video behind the scene, by its number.
+    Frame(u32),
+    /// Renders these frames of the saved scene, the end not included, to a folder or film, and waits.
+    Range(u32, u32, PathBuf),
     Undo,
     Redo,
     Save,
@@ -62,8 +74,14 @@ pub enum Held {
 pub enum Expectation {
     /// Within a share of the value.
     Value(Quantity, f64, f64),
+    /// Within a hundred thousandth.
+    Material(String, MaterialNumber, f64),
+    /// An object's translation, within metres.
+    Position(String, [f64; 3], f64),
     /// The object's lowest point touches the real surface under it, within metres.
     Rests(String, f64),
+    /// The frame shown, by its number.
+    Frame(u32),
     Saved,
     Unsaved,
     Problem,
@@ -71,82 +89,6 @@ pub enum Expectation {
     /// The file, rendered anew, gives the picture that is shown, bit for bit.
     FileEqualsWindow,
     FileDiffersFromWindow,
-}
-
-/// A number of a composition by its name in the scene file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    FNumber,
-    FocusDistance,
-    EnvironmentScale,
-    EnvironmentRotation,
-    Exposure,
-    RaysPerPixel,
-    MaxBounces,
-    Seed,
-}
-
-impl Choice for Quantity {
-    const CHOICES: &'static [(&'static str, Self)] = &[
-        ("f_number", Self::FNumber),
-        ("focus_distance_m", Self::FocusDistance),
-        ("environment_scale", Self::EnvironmentScale),
-        ("environment_rotation_deg", Self::EnvironmentRotation),
-        ("exposure_ev", Self::Exposure),
-        ("rays_per_pixel", Self::RaysPerPixel),
-        ("max_bounces", Self::MaxBounces),
-        ("seed", Self::Seed),
-    ];
-}
-
-impl Quantity {
-    /// `None`: the scene has no such thing.
-    pub fn of(self, composition: &Composition) -> Option<f64> {
-        match self {
-            Self::FNumber => match composition.lens.opening {
-                Opening::FNumber { f_number, .. } => Some(f_number),
-                Opening::RadiusM(_) => None,
-            },
-            Self::FocusDistance => Some(composition.lens.focus_distance_m),
-            Self::EnvironmentScale => composition.environment.map(|form| form.scale),
-            Self::EnvironmentRotation => composition.environment.map(|form| form.rotation_deg),
-            Self::Exposure => match composition.exposure {
-                Exposure::Ev(ev) => Some(ev),
-                Exposure::Auto => None,
-            },
-            Self::RaysPerPixel => Some(f64::from(composition.rays_per_pixel)),
-            Self::MaxBounces => Some(f64::from(composition.max_bounces)),
-            Self::Seed => Some(f64::from(composition.seed)),
-        }
-    }
-
-    pub fn set(self, composition: &mut Composition, value: f64) {
-        let count = value.clamp(1.0, f64::from(u32::MAX)) as u32;
-        match self {
-            Self::FNumber => {
-                if let Opening::FNumber { f_number, .. } = &mut composition.lens.opening {
-                    *f_number = value;
-                }
-            }
-            Self::FocusDistance => composition.lens.focus_distance_m = value,
-            Self::EnvironmentScale => {
-                composition.environment = composition.environment.map(|form| EnvironmentForm {
-                    scale: value,
-                    ..form
-                });
-            }
-            Self::EnvironmentRotation => {
-                composition.environment = composition.environment.map(|form| EnvironmentForm {
-                    rotation_deg: value,
-                    ..form
-                });
-            }
-            Self::Exposure => composition.exposure = Exposure::Ev(value),
-            Self::RaysPerPixel => composition.rays_per_pixel = count,
-            Self::MaxBounces => composition.max_bounces = count,
-            Self::Seed => composition.seed = value.max(0.0) as u32,
-        }
-    }
 }
 
 /// Reads a script.
@@ -182,6 +124,8 @@ fn parse_step(line: &str) -> Result<Step, String> {
         ("drag", [x, y, "to", to_x, to_y]) => {
             Step::Drag([number(x)?, number(y)?], [number(to_x)?, number(to_y)?])
         }
+        ("select", [_, ..]) => Step::Select(rest.to_owned()),
+        ("pull", [handle, x, y]) => Step::Pull(choice(handle)?, [number(x)?, number(y)?]),
         ("wheel", [x, y, notches, keys @ ..]) => Step::Wheel(
             [number(x)?, number(y)?],
             number(notches)? as f32,
@@ -190,8 +134,16 @@ fn parse_step(line: &str) -> Result<Step, String> {
         ("key", [name, keys @ ..]) => Step::Key((*name).to_owned(), held(keys)?),
         ("press", [_, ..]) => Step::Press(rest.to_owned()),
         ("set", [quantity, value]) => Step::Set(choice(quantity)?, number(value)?),
+        ("material", [object, key, value]) => {
+            Step::Material((*object).to_owned(), choice(key)?, number(value)?)
+        }
         ("view", [view]) => Step::View(choice(view)?),
         ("drop", [_, ..]) => Step::Drop(PathBuf::from(rest)),
+        ("frame", [number]) => Step::Frame(whole(number)?),
+        ("range", [from, to, _, ..]) => {
+            let output = rest.splitn(3, ' ').last().unwrap_or_default();
+            Step::Range(whole(from)?, whole(to)?, PathBuf::from(output))
+        }
         ("undo", []) => Step::Undo,
         ("redo", []) => Step::Redo,
         ("save", []) => Step::Save,
@@ -213,6 +165,14 @@ fn expectation(words: &[&str]) -> Result<Expectation, String> {
         ["rests", name, "within", distance] => {
             Expectation::Rests((*name).to_owned(), number(distance)?)
         }
+        ["position", name, x, y, z, "within", distance] => {
+            let point = [number(x)?, number(y)?, number(z)?];
+            Expectation::Position((*name).to_owned(), point, number(distance)?)
+        }
+        ["material", object, key, value] => {
+            Expectation::Material((*object).to_owned(), choice(key)?, number(value)?)
+        }
+        ["frame", number] => Expectation::Frame(whole(number)?),
         ["saved"] => Expectation::Saved,
         ["unsaved"] => Expectation::Unsaved,
         ["problem"] => Expectation::Problem,
@@ -263,6 +223,11 @@ fn number(word: &str) -> Result<f64, String> {
 fn count(word: &str) -> Result<u32, String> {
     let number = word.parse().ok().filter(|number| *number > 0);
     number.ok_or_else(|| format!("`{word}`; expected a whole number above 0; correct it"))
+}
+
+fn whole(word: &str) -> Result<u32, String> {
+    let number = word.parse().ok();
+    number.ok_or_else(|| format!("`{word}`; expected a whole number; correct it"))
 }
 
 fn size(word: &str) -> Result<f32, String> {

@@ -1,4 +1,4 @@
-//! A still rendered at full quality beside the preview.
+//! A still, or frames of a video, rendered at full quality beside the preview.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
@@ -10,6 +10,7 @@ use crate::output::{
 };
 use crate::renderer::{Budget, Delivered, Progress, Renderer, RendererOptions, Watcher};
 use crate::scene::Scene;
+use crate::sequence::{SequenceOptions, render_sequence};
 use crate::stages::finish_in_layers;
 
 /// Below both renderers of the window.
@@ -24,7 +25,7 @@ pub enum StillState {
     Failed(String),
 }
 
-/// A still on its way to a file.
+/// On its way to a file, or a folder.
 pub struct Still {
     pub path: PathBuf,
     state: Arc<Mutex<StillState>>,
@@ -50,6 +51,26 @@ impl Still {
             ));
         }
         let target = Target::picture(&path).map_err(|error| error.to_string())?;
+        Ok(Self::spawn(path, wake, move |stop, tell| {
+            render(scene, &target, stop, tell)
+        }))
+    }
+
+    /// Renders frames as `mixray sequence` does.
+    pub fn of_range(options: SequenceOptions, wake: impl Fn() + Send + Sync + 'static) -> Self {
+        Self::spawn(options.output.clone(), wake, move |stop, _| {
+            let cancelled = || stop.is_asked();
+            let watcher = Watcher::none().cancelled_by(&cancelled);
+            let rendered = render_sequence(&options, &watcher, &|_| ());
+            rendered.map(|_| ()).map_err(|error| error.to_string())
+        })
+    }
+
+    fn spawn(
+        path: PathBuf,
+        wake: impl Fn() + Send + Sync + 'static,
+        work: impl FnOnce(&Stop, &(dyn Fn(StillState) + Sync)) -> Result<(), String> + Send + 'static,
+    ) -> Self {
         let state = Arc::new(Mutex::new(StillState::Rendering(None)));
         let stop = Stop::default();
         let (told, asked) = (state.clone(), stop.clone());
@@ -59,7 +80,7 @@ impl Still {
                 wake();
             };
             let end = match polite_pool(STILL_NICE) {
-                Ok(pool) => pool.install(|| render(scene, &target, &asked, &tell)),
+                Ok(pool) => pool.install(|| work(&asked, &tell)),
                 Err(error) => Err(error.to_string()),
             };
             tell(match end {
@@ -68,12 +89,12 @@ impl Still {
                 Err(problem) => StillState::Failed(problem),
             });
         });
-        Ok(Self {
+        Self {
             path,
             state,
             stop,
             thread: Some(thread),
-        })
+        }
     }
 
     pub fn state(&self) -> StillState {

@@ -4,7 +4,8 @@ use glam::DMat4;
 
 use super::{RenderError, Renderer};
 use crate::gpu::Changed;
-use crate::scene::{Exposure, Lens, Light, LightKind, Settings, Side};
+use crate::pack::traced_shutter;
+use crate::scene::{Exposure, Lens, Light, LightKind, Settings, Side, Stages};
 use crate::work::Watcher;
 
 impl Renderer {
@@ -126,6 +127,19 @@ impl Renderer {
         self.core.packed.set_settings(&self.core.scene);
         self.core.pack_moving(watcher)?;
         self.restart(true, Changed::All, watcher)
+    }
+
+    /// Other camera stages. They work on what is delivered: the film stays, unless another way to show motion traces other rays.
+    ///
+    /// # Errors
+    /// As [`Renderer::set_lens`].
+    pub fn set_stages(&mut self, stages: Stages, watcher: &Watcher<'_>) -> Result<(), RenderError> {
+        let before = traced_shutter(&self.core.scene);
+        self.core.scene.stages = stages;
+        match traced_shutter(&self.core.scene) == before {
+            true => Ok(()),
+            false => self.restart(false, Changed::View, watcher),
+        }
     }
 
     /// Other lights. Real quads are part of the real world, so where they change it is built anew.

@@ -87,8 +87,20 @@ pub fn load_with(path: &Path, given: Given) -> std::result::Result<Scene, SceneE
 /// # Errors
 /// As [`load`].
 pub fn load_text(path: &Path, text: &str) -> std::result::Result<Scene, SceneError> {
+    load_text_with(path, text, Given::default())
+}
+
+/// [`load_text`] with what the caller brings.
+///
+/// # Errors
+/// As [`load_with`].
+pub fn load_text_with(
+    path: &Path,
+    text: &str,
+    given: Given,
+) -> std::result::Result<Scene, SceneError> {
     let source = Source::new(path, text.as_bytes().to_vec())?;
-    read_scene(&source, Given::default())
+    read_scene(&source, given)
 }
 
 pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {

@@ -38,7 +38,7 @@ pub use crate::decode::{ColourProfile, Tags};
 pub use crate::distortion::Distortion;
 pub use crate::stages::settings::*;
 pub use error::SceneError;
-pub use file::{Given, load, load_text, load_with};
+pub use file::{Given, load, load_text, load_text_with, load_with};
 pub use fingerprint::{Content, ContentHash};
 pub use material::Material;
 pub use photo::{LayerPicture, read_codes, read_coverage, read_layer};

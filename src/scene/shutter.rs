@@ -73,6 +73,11 @@ impl ObjectMotion {
         Self { rest, keys }
     }
 
+    /// From the first key to the last.
+    pub fn span_secs(&self) -> Option<(f64, f64)> {
+        Some((self.keys.first()?.time_secs, self.keys.last()?.time_secs))
+    }
+
     /// World-from-object at a time: the object as it is placed, then moved.
     pub fn at(&self, time_secs: f64) -> DMat4 {
         let after = self.keys.partition_point(|key| key.time_secs <= time_secs);

@@ -16,13 +16,10 @@ use crate::renderer::{
     Budget, Delivered, ErrorGoal, FrameEdit, Mattes, NeighbourView, RayCounts, Renderer,
     RendererOptions, Watcher,
 };
-use crate::scene::trajectory::{CameraPath, FrameName, FrameView, Views};
+use crate::scene::trajectory::{FrameName, FrameView};
 use crate::scene::{Camera, Lens, MotionBlurMethod, Scene};
 use crate::stages::{Finished, GpuStages, finish, finish_in_layers};
 use crate::video::{FrameSink, Header, Pixels, SinkPlan, Taken, VideoFrame};
-
-/// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
-const REACH_FRAMES: f64 = 1.5;
 
 /// What became of a sequence.
 #[derive(Debug)]
@@ -220,7 +217,7 @@ impl Sequence<'_> {
             },
         };
         let time_secs = view.time_secs.unwrap_or(0.0);
-        let near = near(&self.whole.views, time_secs);
+        let near = self.whole.views.path_near(time_secs);
         let neighbour = |(time_secs, world_from_camera)| NeighbourView {
             world_from_camera,
             time_secs,
@@ -475,12 +472,6 @@ impl Sequence<'_> {
         );
         Ok(RenderedSequence { stats, complete })
     }
-}
-
-/// The camera's way around a frame.
-fn near(views: &Views<'_>, time_secs: f64) -> CameraPath {
-    let spacing = views.frame_secs().unwrap_or(0.0);
-    views.path().around(time_secs, REACH_FRAMES * spacing)
 }
 
 /// At a constant rate in 1/m: what a lens barrel turns through.

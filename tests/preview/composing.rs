@@ -6,8 +6,7 @@ use mixray::preview::script::{Held, parse};
 use mixray::renderer::{Budget, Renderer, RendererOptions, Watcher};
 use mixray::scene::{Lens, load};
 
-use super::{FRAME_TIME, folder, window};
-use crate::support::{Folder, root};
+use super::{FRAME_TIME, demo, folder, window};
 
 /// Where the ball's middle is seen.
 const BALL: [f64; 2] = [32.0, 19.0];
@@ -26,22 +25,6 @@ fn focus_m(window: &Window) -> f64 {
         .unwrap()
         .lens
         .focus_distance_m
-}
-
-/// The demo with few rays, and its photograph, meshes and light.
-fn demo() -> Folder {
-    let folder = Folder::new();
-    let from = root().join("scenes/demo");
-    for entry in std::fs::read_dir(from).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-        folder.write(&name, std::fs::read(&path).unwrap());
-    }
-    let text = folder.read("scene.toml");
-    let few = text.replace("rays_per_pixel = 49", "rays_per_pixel = 2");
-    assert_ne!(few, text);
-    folder.write("scene.toml", few);
-    folder
 }
 
 #[test]

@@ -144,6 +144,39 @@ fn meshes_and_images_are_dropped_into_the_scene() {
 }
 
 #[test]
+fn a_file_is_chosen_from_the_list() {
+    let folder = folder();
+    folder.create("models");
+    let knot = crate::support::root().join("scenes/demo/knot.glb");
+    folder.write("models/knot.glb", std::fs::read(knot).unwrap());
+    folder.write("models/notes.txt", "not for the window");
+    let mut window = window(&folder);
+    // The list measures itself in its first frames.
+    let open = |window: &mut Window| {
+        window.press("Open").unwrap();
+        window.frame();
+        window.frame();
+    };
+    open(&mut window);
+    window.press("models/").unwrap();
+    assert!(window.press("notes.txt").is_err());
+    window.press("knot.glb").unwrap();
+    window.wait_for_scene().unwrap();
+    assert!(window.session().object("knot").is_some());
+    window.session_mut().save();
+    assert!(
+        folder
+            .read("scene.toml")
+            .contains("mesh = \"models/knot.glb\"")
+    );
+    open(&mut window);
+    window.press("Up").unwrap();
+    window.press("scene.toml").unwrap();
+    window.wait_for_scene().unwrap();
+    assert!(window.session().object("knot").is_some(), "as it was saved");
+}
+
+#[test]
 fn a_scene_that_is_broken_from_the_start_is_told() {
     let folder = Folder::new();
     folder.write("scene.toml", "[camera\n");

@@ -2,7 +2,12 @@
 
 mod composing;
 mod files;
+mod gizmo;
+mod layout;
 mod random_walk;
+mod real_window;
+mod stages;
+mod timeline;
 
 use std::time::Duration;
 
@@ -10,7 +15,7 @@ use mixray::preview::headless::Window;
 use mixray::preview::session::Session;
 use mixray::preview::window::App;
 
-use crate::support::Folder;
+use crate::support::{Folder, root};
 
 const FRAME_TIME: Duration = Duration::from_millis(33);
 
@@ -53,6 +58,22 @@ max_bounces = 2
 fn folder() -> Folder {
     let folder = Folder::new();
     folder.write("scene.toml", SCENE);
+    folder
+}
+
+/// The demo with few rays, and its photograph, meshes and light.
+fn demo() -> Folder {
+    let folder = Folder::new();
+    let from = root().join("scenes/demo");
+    for entry in std::fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        folder.write(&name, std::fs::read(&path).unwrap());
+    }
+    let text = folder.read("scene.toml");
+    let few = text.replace("rays_per_pixel = 49", "rays_per_pixel = 2");
+    assert_ne!(few, text);
+    folder.write("scene.toml", few);
     folder
 }
 

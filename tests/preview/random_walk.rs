@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use mixray::preview::headless::Window;
-use mixray::preview::script::{Held, Quantity, Step};
+use mixray::preview::quantity::Quantity;
+use mixray::preview::script::{Held, Step};
 use mixray::preview::view::View;
 use mixray::scene::{Choice, load_text};
 
@@ -28,6 +29,7 @@ fn event(window: &mut Window, folder: &Folder, random: &mut Random) {
         60..70 => {
             let names = [
                 "W",
+                "G",
                 "P",
                 "0",
                 "Delete",
@@ -40,7 +42,12 @@ fn event(window: &mut Window, folder: &Folder, random: &mut Random) {
             window.key(names[below(random, names.len())], held).unwrap();
         }
         70..78 => {
-            let (_, quantity) = Quantity::CHOICES[below(random, Quantity::CHOICES.len())];
+            let composition = window.session().composition().unwrap();
+            let there: Vec<Quantity> = (Quantity::CHOICES.iter())
+                .map(|(_, quantity)| *quantity)
+                .filter(|quantity| quantity.of(composition).is_some())
+                .collect();
+            let quantity = there[below(random, there.len())];
             let value = 0.6 + 3.0 * random.uniform();
             window
                 .session_mut()

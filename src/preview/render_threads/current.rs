@@ -34,7 +34,9 @@ pub(super) fn take_up(
 ) -> Result<Option<&'static str>, RenderError> {
     let has_real = wanted.view.needs_real();
     let fits = |current: &Current| {
-        Arc::ptr_eq(&current.scene, &wanted.scene) && current.has_real == has_real
+        Arc::ptr_eq(&current.scene, &wanted.scene)
+            && current.has_real == has_real
+            && !Difference::between(&current.composition, &wanted.composition).built
     };
     if let Some(current) = current.as_mut().filter(|current| fits(current)) {
         let difference = Difference::between(&current.composition, &wanted.composition);
@@ -95,6 +97,9 @@ fn edit(
     }
     if difference.samples && level == Level::Fine {
         renderer.set_samples(to.rays_per_pixel, to.seed, watcher)?;
+    }
+    if difference.stages {
+        renderer.set_stages(to.stages.clone(), watcher)?;
     }
     if difference.camera {
         set_camera(renderer, level, to, watcher)?;

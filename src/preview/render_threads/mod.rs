@@ -5,13 +5,13 @@ mod current;
 mod pictures;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, Weak};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
-use super::composition::Composition;
+use super::composition::{Composition, Difference};
 use super::view::View;
 use crate::clock::thread_time;
 use crate::film::Picture;
@@ -52,6 +52,8 @@ pub struct Shown {
     pub revision: u64,
     pub level: Level,
     pub view: View,
+    scene: Weak<Scene>,
+    composition: Composition,
     pub width: u32,
     pub height: u32,
     /// As they are shown, row-major from the top left.
@@ -69,6 +71,14 @@ pub struct Shown {
 impl Shown {
     pub fn is_complete(&self) -> bool {
         self.level == Level::Fine && self.samples >= self.samples_total
+    }
+
+    /// The whole picture's film is there, and at most what is made of it changes.
+    fn has_film_of(&self, wanted: &Wanted) -> bool {
+        self.level == Level::Fine
+            && self.view == wanted.view
+            && Weak::as_ptr(&self.scene) == Arc::as_ptr(&wanted.scene)
+            && Difference::between(&self.composition, &wanted.composition).keeps_film()
     }
 }
 
@@ -253,7 +263,10 @@ fn next(shared: &Shared, level: Level, stand: &Stand) -> Option<Arc<Wanted>> {
             let fine_is_shown = (state.shown.as_ref()).is_some_and(|shown| {
                 shown.level == Level::Fine && shown.revision == wanted.revision
             });
+            let has_film = (state.shown.as_ref()).is_some_and(|shown| shown.has_film_of(wanted));
             match level {
+                Level::Fine if is_new && has_film => return Some(wanted.clone()),
+                Level::Coarse if has_film => {}
                 // The coarse answer has the processors for itself, and wakes this thread.
                 Level::Fine if is_new && !is_answered => {}
                 Level::Fine if is_new && !settles_in.is_zero() => pause = Some(settles_in),

@@ -1,5 +1,7 @@
 //! What the two renderers show.
 
+use std::sync::Arc;
+
 use super::{Level, Shown, Wanted};
 use crate::film::Picture;
 use crate::output::picture_codes8;
@@ -80,6 +82,8 @@ fn shown(
         height,
         codes,
         picture,
+        scene: Arc::downgrade(&wanted.scene),
+        composition: wanted.composition.clone(),
         samples: renderer.samples(),
         samples_total: wanted.composition.rays_per_pixel,
         device: renderer.device_name(),

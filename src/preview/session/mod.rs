@@ -2,12 +2,13 @@
 //!
 //! Nothing here waits: files are read on a thread of their own, pictures come from [`RenderThreads`].
 
+mod reading;
 mod rewriting;
+mod timeline;
 mod unsaved;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -15,6 +16,7 @@ use glam::DVec2;
 
 use super::composition::{Composition, rounded, virtual_objects};
 use super::document::Document;
+use super::frames::Frames;
 use super::geometry::{Geometry, Pick};
 use super::history::History;
 use super::render_threads::{RenderThreads, Shown, Wanted};
@@ -22,7 +24,9 @@ use super::still::Still;
 use super::view::View;
 use super::watch::Watch;
 use crate::output::write_text;
-use crate::scene::{Scene, load_text};
+use crate::scene::{Object, Scene, Stages};
+use reading::Reading;
+pub use rewriting::TAKEN_ENDINGS;
 use unsaved::AUTOSAVE_EVERY;
 
 /// A text that was read, and what was edited since.
@@ -42,15 +46,36 @@ pub struct Loaded {
     text: Arc<str>,
 }
 
-/// A text on its way to a scene.
-struct Reading {
-    result: Receiver<Result<Box<Loaded>, String>>,
-    /// Edits upon it; `None`: as the text has it.
-    composition: Option<Composition>,
-    /// What undo brings back once it is read, by what change; `None`: undo or redo themselves.
-    change: Option<&'static str>,
-    /// It is what the disk holds.
-    is_saved: bool,
+impl Loaded {
+    /// Something has a way in time: the camera, or an object.
+    pub fn moves(&self) -> bool {
+        !self.scene.camera_path.is_empty() || self.scene.objects.iter().any(Object::is_animated)
+    }
+
+    /// From the first of its keys to the last; a second where it has none.
+    pub fn span_secs(&self) -> (f64, f64) {
+        let path = &self.scene.camera_path;
+        let ends = [
+            path.key_after(f64::NEG_INFINITY),
+            path.key_before(f64::INFINITY),
+        ];
+        let of_camera = ends.into_iter().flatten().map(|(time_secs, _)| time_secs);
+        let objects = self.scene.objects.iter();
+        let of_objects = objects
+            .clone()
+            .filter_map(|o| o.motion.as_ref()?.span_secs());
+        let parts = objects.flat_map(|object| &object.instances);
+        let of_parts =
+            parts.filter_map(|part| Some(part.animation.as_ref()?.animation.duration_secs));
+        let times = of_camera
+            .chain(of_objects.flat_map(|(first, last)| [first, last]))
+            .chain(of_parts.flat_map(|duration_secs| [0.0, duration_secs]));
+        let span = times.fold(None, |span: Option<(f64, f64)>, time| {
+            let (first, last) = span.unwrap_or((time, time));
+            Some((first.min(time), last.max(time)))
+        });
+        span.unwrap_or((0.0, 1.0))
+    }
 }
 
 pub struct Session {
@@ -64,6 +89,9 @@ pub struct Session {
     disk: Arc<str>,
     history: History<Edited>,
     reading: Option<Reading>,
+    /// `None`: the scene is of one picture.
+    frames: Option<Arc<Frames>>,
+    frame: usize,
     revision: u64,
     view: View,
     watch: Option<Watch>,
@@ -73,6 +101,7 @@ pub struct Session {
     has_conflict: bool,
     /// Unsaved work of a run that ended without a word.
     recovered: Option<String>,
+    keeps_unsaved_work: bool,
     autosaved: Option<(Edited, Instant)>,
     /// Writes it.
     autosaving: Option<thread::JoinHandle<()>>,
@@ -101,12 +130,15 @@ impl Session {
             disk: Arc::from(""),
             history: History::default(),
             reading: None,
+            frames: None,
+            frame: 0,
             revision: 0,
             view: View::Picture,
             watch: None,
             problem: None,
             has_conflict: false,
             recovered: None,
+            keeps_unsaved_work: true,
             autosaved: None,
             autosaving: None,
             still: None,
@@ -123,6 +155,7 @@ impl Session {
         (self.loaded, self.present, self.saved) = (None, None, None);
         (self.watch, self.reading, self.problem) = (None, None, None);
         self.has_conflict = false;
+        self.frames = None;
         self.history.clear();
         self.recovered = std::fs::read_to_string(self.autosave_path()).ok();
         self.read_disk();
@@ -215,135 +248,27 @@ impl Session {
         watch.into_iter().chain(autosave).min()
     }
 
-    fn take_up(&mut self, result: Result<Box<Loaded>, String>, now: Instant) {
-        let Some(reading) = self.reading.take() else {
-            return;
-        };
-        let loaded = match result {
-            Ok(loaded) => loaded,
-            Err(problem) => {
-                self.problem = Some(problem);
-                self.watch_anew();
-                return;
-            }
-        };
-        self.problem = None;
-        let fits = |composition: &Composition| {
-            composition.objects.len() == loaded.base.objects.len()
-                && composition.environment.is_some() == loaded.base.environment.is_some()
-        };
-        let composition = reading.composition.filter(fits);
-        let edited = Edited {
-            text: loaded.text.clone(),
-            composition: composition.unwrap_or_else(|| loaded.base.clone()),
-        };
-        if reading.is_saved {
-            self.saved = Some(Edited {
-                composition: loaded.base.clone(),
-                ..edited.clone()
-            });
-            self.has_conflict = false;
-        }
-        if let (Some(before), Some(change)) = (self.present.take(), reading.change)
-            && before != edited
-        {
-            self.history.changed(before, change, now);
-            self.history.end_gesture();
-        }
-        self.present = Some(edited);
-        self.loaded = Some(loaded);
-        self.watch_anew();
-        self.want();
-    }
-
-    fn watch_anew(&mut self) {
-        let wake = self.wake.clone();
-        let inputs = self
-            .loaded
-            .as_ref()
-            .map(|loaded| loaded.scene.inputs.clone());
-        let files = inputs.unwrap_or_else(|| vec![self.path.clone()]);
-        match Watch::new(files, move || wake()) {
-            Ok(watch) => self.watch = Some(watch),
-            Err(error) => {
-                self.watch = None;
-                self.problem = Some(format!(
-                    "changes on disk are not noticed: {error}; use Reload"
-                ));
-            }
-        }
-    }
-
-    fn files_changed(&mut self, changed: &[PathBuf]) {
-        let same = |file: &PathBuf| file.canonicalize().ok() == self.path.canonicalize().ok();
-        let disk = std::fs::read_to_string(&self.path).ok();
-        let is_other = changed.iter().any(same) && disk.as_deref() != Some(&*self.disk);
-        if is_other {
-            match self.is_dirty() {
-                true => self.has_conflict = true,
-                false => self.read_disk(),
-            }
-        } else if let Some(present) = self.present.clone().filter(|_| !changed.iter().all(same)) {
-            // A mesh, or an image.
-            self.read(present.text, Some(present.composition), None, false);
-        }
-    }
-
-    /// Reads the scene file again; what was edited can be brought back by undo.
-    pub fn reload(&mut self) {
-        self.read_disk();
-    }
-
-    fn read_disk(&mut self) {
-        match std::fs::read(&self.path) {
-            // What is no text is refused with its place by the reader.
-            Ok(bytes) => {
-                let text: Arc<str> = Arc::from(String::from_utf8_lossy(&bytes));
-                self.disk = text.clone();
-                self.read(text, None, Some("reload"), true);
-            }
-            Err(error) => {
-                self.problem = Some(format!(
-                    "{}: cannot be read ({error}); expected a scene file; correct the path",
-                    self.path.display()
-                ));
-            }
-        }
-    }
-
-    fn read(
-        &mut self,
-        text: Arc<str>,
-        composition: Option<Composition>,
-        change: Option<&'static str>,
-        is_saved: bool,
-    ) {
-        self.problem = None;
-        let (sender, result) = channel();
-        let (path, wake) = (self.path.clone(), self.wake.clone());
-        thread::spawn(move || {
-            // Nobody waits for it if another text came meanwhile.
-            let _ = sender.send(load(&path, text));
-            wake();
-        });
-        self.reading = Some(Reading {
-            result,
-            composition,
-            change,
-            is_saved,
-        });
+    /// The stages that the file asks for.
+    pub fn stages_of_file(&self) -> Option<&Stages> {
+        self.loaded.as_ref().map(|loaded| &loaded.base.stages)
     }
 
     /// Changes what is shown; `what` names the gesture or slider, whose changes are undone together. Nothing happens before the scene is read.
     pub fn edit(&mut self, what: &str, change: impl FnOnce(&mut Composition)) {
-        let Some(present) = &mut self.present else {
+        let is_led = self.camera_is_led();
+        let Some(before) = self.present.clone() else {
             return;
         };
-        let before = present.clone();
-        change(&mut present.composition);
-        if *present == before {
+        let mut after = before.clone();
+        change(&mut after.composition);
+        if is_led {
+            after.composition.camera = before.composition.camera;
+        }
+        self.keep_frame(&mut after.composition, &before.composition);
+        if after == before {
             return;
         }
+        self.present = Some(after);
         self.history.changed(before.clone(), what, Instant::now());
         self.show_from(&before.composition);
     }
@@ -403,7 +328,10 @@ impl Session {
         }
     }
 
-    fn go_to(&mut self, state: Edited) {
+    fn go_to(&mut self, mut state: Edited) {
+        if let Some(present) = &self.present {
+            self.keep_frame(&mut state.composition, &present.composition);
+        }
         let same_text = (self.loaded.as_ref()).is_some_and(|loaded| loaded.text == state.text);
         if !same_text {
             self.read(state.text, Some(state.composition), None, false);
@@ -498,25 +426,15 @@ impl Session {
 
     /// The command line that renders the saved scene.
     pub fn command(&self) -> String {
-        let path = self.path.to_string_lossy();
-        let is_plain = |c: char| c.is_alphanumeric() || "/._-+".contains(c);
-        match path.chars().all(is_plain) {
-            true => format!("mixray render {path}"),
-            false => format!("mixray render '{}'", path.replace('\'', r"'\''")),
-        }
+        format!("mixray render {}", quoted(&self.path.to_string_lossy()))
     }
 }
 
-/// Reads a text as the scene file of that path.
-fn load(path: &Path, text: Arc<str>) -> Result<Box<Loaded>, String> {
-    let scene = load_text(path, &text).map_err(|error| error.to_string())?;
-    let document = Document::parse(&text).map_err(|error| error.to_string())?;
-    let geometry = Geometry::build(&scene).map_err(|error| error.to_string())?;
-    Ok(Box::new(Loaded {
-        base: document.composition(&scene),
-        scene: Arc::new(scene),
-        geometry,
-        document,
-        text,
-    }))
+/// As a shell takes it for one word.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+".contains(c);
+    match word.chars().all(is_plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
 }

@@ -9,6 +9,11 @@ use super::Session;
 use crate::preview::composition::{Placement, virtual_objects};
 use crate::preview::document::{Document, name_of};
 
+/// Of files that [`Session::take_file`] takes.
+pub const TAKEN_ENDINGS: [&str; 9] = [
+    "toml", "glb", "gltf", "png", "jpg", "jpeg", "webp", "hdr", "exr",
+];
+
 impl Session {
     /// A file that was dropped: a scene, a mesh, or an image; at that position of the photograph.
     pub fn take_file(&mut self, file: &Path, pixel: Option<DVec2>) {

@@ -21,10 +21,15 @@ impl Session {
         self.path.with_file_name(name)
     }
 
+    /// Nothing is kept beside the scene file from now on.
+    pub fn keep_no_unsaved_work(&mut self) {
+        self.keeps_unsaved_work = false;
+    }
+
     /// Writes what is new, now and then.
     pub(super) fn autosave(&mut self, now: Instant) {
         let is_writing = (self.autosaving.as_ref()).is_some_and(|writing| !writing.is_finished());
-        if !self.is_dirty() || self.recovered.is_some() || is_writing {
+        if !self.keeps_unsaved_work || !self.is_dirty() || self.recovered.is_some() || is_writing {
             return;
         }
         let Some(present) = self.present.clone() else {

@@ -1,5 +1,6 @@
 //! The picture, and what the pointer does on it.
 
+mod gizmo;
 mod paint;
 
 use std::sync::Arc;
@@ -12,6 +13,7 @@ use glam::{DVec2, DVec3};
 
 use crate::preview::composition::{Placement, rounded};
 use crate::preview::geometry::seen_at;
+use crate::preview::gizmo::Handle;
 use crate::preview::manipulate::{dollied, orbited, panned, scaled, turned};
 use crate::preview::render_threads::{Shown, photo_codes};
 use crate::preview::session::Session;
@@ -41,6 +43,14 @@ enum Gesture {
         radius: f32,
         from: Placement,
     },
+    /// By a handle: where it was caught, and by how much it was dragged, metres or radians.
+    Gizmo {
+        object: usize,
+        handle: Handle,
+        from: Placement,
+        start: f64,
+        by: f64,
+    },
     Orbit,
     PanCamera,
     /// The environment.
@@ -63,6 +73,8 @@ pub(super) struct Canvas {
     gesture: Option<Gesture>,
     pub selected: Option<usize>,
     pub wireframe: bool,
+    /// Arrows and rings on the selected object.
+    pub shows_gizmo: bool,
     /// Share of the width that shows the picture; the rest shows the bare photograph.
     pub wipe: Option<f32>,
     /// Where the picture lies, points.
@@ -82,6 +94,7 @@ impl Default for Canvas {
             gesture: None,
             selected: None,
             wireframe: false,
+            shows_gizmo: true,
             wipe: None,
             place: Rect::NOTHING,
             size: Vec2::ZERO,
@@ -234,6 +247,9 @@ impl Canvas {
         if border.is_some_and(|border| (border - at.x).abs() < CORNER_PT) {
             return Gesture::Wipe;
         }
+        if let Some(gizmo) = self.begin_gizmo(session, at) {
+            return gizmo;
+        }
         if let Some(scale) = self.begin_scale(session, at) {
             return scale;
         }
@@ -294,6 +310,7 @@ impl Canvas {
                     composition.objects[object] = scaled(&from, factor, foot);
                 });
             }
+            Some(Gesture::Gizmo { .. }) => self.drag_gizmo(session, at),
             Some(Gesture::Orbit) => {
                 let distance = focus_or_metre(session);
                 session.edit("orbit", |composition| {

@@ -6,6 +6,7 @@ use eframe::egui::{self, Key, Modifiers};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Act {
     Help,
+    Open,
     Save,
     Undo,
     Redo,
@@ -13,6 +14,7 @@ pub(super) enum Act {
     Fit,
     Wireframe,
     Wipe,
+    Gizmo,
     Remove,
     WiderAperture,
     NarrowerAperture,
@@ -29,6 +31,7 @@ const KEYS: &[(Modifiers, Key, Act, &str)] = &[
     (COMMAND_SHIFT, Key::Z, Act::Redo, "redo"),
     (COMMAND, Key::Z, Act::Undo, "undo"),
     (COMMAND, Key::Y, Act::Redo, "redo"),
+    (COMMAND, Key::O, Act::Open, "open a file"),
     (COMMAND, Key::S, Act::Save, "save the scene file"),
     (COMMAND, Key::R, Act::Reload, "read the scene file again"),
     (
@@ -48,6 +51,12 @@ const KEYS: &[(Modifiers, Key, Act, &str)] = &[
         Key::P,
         Act::Wipe,
         "wipe against the bare photograph",
+    ),
+    (
+        Modifiers::NONE,
+        Key::G,
+        Act::Gizmo,
+        "arrows and rings on the selected object",
     ),
     (
         Modifiers::NONE,
@@ -75,6 +84,10 @@ const POINTER: &[(&str, &str)] = &[
     (
         "drag an object",
         "along the real surface under it, resting on it",
+    ),
+    (
+        "drag an arrow, a ring",
+        "move the selected object along an axis, turn it about one",
     ),
     ("drag a corner of the frame", "scale the selected object"),
     (

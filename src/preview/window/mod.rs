@@ -1,21 +1,27 @@
 //! The window: draws a [`Session`] and turns what is done in it into edits.
 
 mod canvas;
+mod file_list;
 mod keys;
 mod panel;
+mod timeline;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use eframe::egui::{self, Ui, ViewportCommand};
 use glam::DVec2;
 
 use super::composition::Opening;
+use super::frames::Frames;
+use super::gizmo::Handle;
 use super::render_threads::Level;
 use super::session::Session;
 use super::still::StillState;
 use canvas::Canvas;
+use file_list::FileList;
 use keys::Act;
+use timeline::Timeline;
 
 /// A third of a stop, as a factor of the f-number.
 const THIRD_STOP: f64 = 1.122_462_048_309_373;
@@ -25,8 +31,9 @@ const PANEL_WIDTH: f32 = 300.0;
 pub struct App {
     pub session: Session,
     canvas: Canvas,
+    timeline: Timeline,
     shows_help: bool,
-    open_path: String,
+    file_list: FileList,
     still_path: String,
     /// The window is asked to close while there is unsaved work.
     asks_to_close: bool,
@@ -39,10 +46,11 @@ impl App {
     pub fn new(session: Session) -> Self {
         let still = session.path().with_extension("png");
         Self {
-            open_path: session.path().display().to_string(),
+            file_list: FileList::beside(session.path()),
             still_path: format!("still-{}", still.file_name().unwrap_or_default().display()),
             session,
             canvas: Canvas::default(),
+            timeline: Timeline::default(),
             shows_help: false,
             asks_to_close: false,
             may_close: false,
@@ -55,6 +63,15 @@ impl App {
         self.canvas.on_screen(pixel)
     }
 
+    /// Where a handle of the selected object's gizmo can be caught, photograph pixels.
+    pub fn grip(&self, handle: Handle) -> Option<DVec2> {
+        self.canvas.grip(&self.session, handle)
+    }
+
+    pub fn select(&mut self, object: Option<usize>) {
+        self.canvas.selected = object;
+    }
+
     /// Draws a frame, and takes up what was done since the last.
     pub fn show(&mut self, ui: &mut Ui) {
         let begin = Instant::now();
@@ -65,6 +82,10 @@ impl App {
         }
         egui::Panel::top("commands").show(ui, |ui| self.commands(ui));
         egui::Panel::bottom("status").show(ui, |ui| self.status(ui));
+        if Timeline::is_needed(&self.session) {
+            egui::Panel::bottom("timeline")
+                .show(ui, |ui| self.timeline.show(ui, &mut self.session));
+        }
         egui::Panel::right("settings")
             .default_size(PANEL_WIDTH)
             .show(ui, |ui| {
@@ -93,12 +114,14 @@ impl App {
         };
         match act {
             Act::Help => self.shows_help = !self.shows_help,
+            Act::Open => self.file_list.open(),
             Act::Save => session.save(),
             Act::Undo => session.undo(),
             Act::Redo => session.redo(),
             Act::Reload => session.reload(),
             Act::Fit => self.canvas.fit(),
             Act::Wireframe => self.canvas.wireframe ^= true,
+            Act::Gizmo => self.canvas.shows_gizmo ^= true,
             Act::Wipe => self.canvas.wipe = self.canvas.wipe.is_none().then_some(0.5),
             Act::WiderAperture => stop(1.0 / THIRD_STOP),
             Act::NarrowerAperture => stop(THIRD_STOP),
@@ -113,28 +136,31 @@ impl App {
     fn take_files(&mut self, ui: &Ui) {
         let dropped = ui.input(|input| input.raw.dropped_files.clone());
         for file in dropped {
-            let path = file.path().to_path_buf();
             let pixel = self.canvas.pointed(ui);
-            self.session.take_file(&path, pixel);
-            if path.extension().is_some_and(|ending| ending == "toml") {
-                self.canvas = Canvas::default();
-                self.open_path = path.display().to_string();
-            }
+            self.take_file(file.path(), pixel);
+        }
+        if let Some(file) = self.file_list.show(ui.ctx()) {
+            self.take_file(&file, None);
+        }
+    }
+
+    fn take_file(&mut self, path: &Path, pixel: Option<DVec2>) {
+        self.session.take_file(path, pixel);
+        if path.extension().is_some_and(|ending| ending == "toml") {
+            self.canvas = Canvas::default();
+            self.timeline = Timeline::default();
         }
     }
 
     fn commands(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            ui.menu_button("Open", |ui| {
-                ui.label("Scene, mesh, photograph or environment:");
-                let line = ui.text_edit_singleline(&mut self.open_path);
-                let entered = line.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
-                if ui.button("Open file").clicked() || entered {
-                    self.session
-                        .take_file(&PathBuf::from(&self.open_path), None);
-                    ui.close();
-                }
-            });
+            let open = ui.button("Open");
+            if open
+                .on_hover_text("scene, mesh, photograph or environment")
+                .clicked()
+            {
+                self.file_list.open();
+            }
             let session = &mut self.session;
             let dirty = session.is_dirty();
             if ui.add_enabled(dirty, egui::Button::new("Save")).clicked() {
@@ -318,7 +344,7 @@ pub enum WindowError {
 ///
 /// # Errors
 /// There is no display, no graphics driver, or no threads.
-pub fn run(scene: &std::path::Path, frame_time: Duration) -> Result<(), WindowError> {
+pub fn run(scene: &Path, frames: Option<Frames>, frame_time: Duration) -> Result<(), WindowError> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_inner_size([1240.0, 760.0])
@@ -332,7 +358,10 @@ pub fn run(scene: &std::path::Path, frame_time: Duration) -> Result<(), WindowEr
         options,
         Box::new(move |creation| {
             let context = creation.egui_ctx.clone();
-            let session = Session::open(&scene, frame_time, move || context.request_repaint())?;
+            let mut session = Session::open(&scene, frame_time, move || context.request_repaint())?;
+            if let Some(frames) = frames {
+                session.follow(frames);
+            }
             Ok(Box::new(App::new(session)))
         }),
     )

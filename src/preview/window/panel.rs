@@ -1,5 +1,8 @@
 //! The side panel: what can be set by numbers.
 
+mod material;
+mod stages;
+
 use eframe::egui::{self, DragValue, Slider, Ui};
 use glam::DVec3;
 
@@ -24,6 +27,8 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, canvas: &mut Canvas) {
         ui.separator();
         rays(ui, session, &composition);
         ui.separator();
+        stages::show(ui, session, &composition);
+        ui.separator();
         objects(ui, session, canvas);
     });
 }
@@ -42,6 +47,7 @@ fn views(ui: &mut Ui, session: &mut Session, canvas: &mut Canvas) {
     });
     ui.horizontal(|ui| {
         ui.checkbox(&mut canvas.wireframe, "Proxy wireframe");
+        ui.checkbox(&mut canvas.shows_gizmo, "Gizmo");
         let mut wipes = canvas.wipe.is_some();
         if ui.checkbox(&mut wipes, "Wipe").changed() {
             canvas.wipe = wipes.then_some(0.5);
@@ -137,7 +143,7 @@ fn lens(ui: &mut Ui, session: &mut Session, lens: &LensForm) {
             .show_ui(ui, |ui| {
                 ui.selectable_value(&mut aperture, Aperture::Disc, "disc");
                 ui.selectable_value(&mut aperture, Aperture::Square, "square");
-                for blades in 5..=9 {
+                for blades in 3..=12 {
                     let name = format!("{blades} blades");
                     ui.selectable_value(&mut aperture, Aperture::Blades(blades), name);
                 }
@@ -283,6 +289,7 @@ fn objects(ui: &mut Ui, session: &mut Session, canvas: &mut Canvas) {
             composition.objects[object] = placement
         });
     }
+    material::show(ui, session, object);
     if ui.button("Remove object").clicked() {
         session.remove(object);
         canvas.selected = None;

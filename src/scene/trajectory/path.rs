@@ -33,6 +33,11 @@ impl CameraPath {
         }
     }
 
+    /// The camera stands still.
+    pub fn is_empty(&self) -> bool {
+        self.keys.is_empty()
+    }
+
     /// World-from-camera at a time; `None` without any key.
     pub fn pose(&self, time_secs: f64) -> Option<DMat4> {
         let (first, last) = (self.keys.first()?, self.keys.last()?);

@@ -23,6 +23,9 @@ pub struct FrameView {
 /// Time stamps of pictures and poses lie this far apart at most, seconds.
 const LONGEST_GAP_SECS: f64 = 0.25;
 
+/// Neighbouring poses tell the motion at a frame if they are at most this many frames away.
+const REACH_FRAMES: f64 = 1.5;
+
 /// Time stamps are rounded by as much at most, seconds.
 const SLACK_SECS: f64 = 1e-4;
 
@@ -115,6 +118,12 @@ impl<'a> Views<'a> {
     /// The camera's way through all posed entries, whether or not their frames are rendered.
     pub fn path(&self) -> &CameraPath {
         &self.path
+    }
+
+    /// The camera's way around a frame's time.
+    pub fn path_near(&self, time_secs: f64) -> CameraPath {
+        let frame_secs = self.frame_secs().unwrap_or(0.0);
+        self.path.around(time_secs, REACH_FRAMES * frame_secs)
     }
 
     /// Poses, null ones included.

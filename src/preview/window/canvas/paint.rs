@@ -51,6 +51,7 @@ impl Canvas {
                 painter.rect_filled(handle, 1.0, Color32::from_rgb(255, 190, 60));
             }
         }
+        self.paint_gizmo(ui, &painter, session);
     }
 
     fn paint_wireframe(&self, painter: &egui::Painter, session: &Session) {

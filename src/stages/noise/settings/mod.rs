@@ -45,6 +45,8 @@ pub struct NoiseSettings {
 impl NoiseSettings {
     /// Most texels of all bins' textures together: 1 GiB of them.
     pub const MAX_TEXELS: u64 = 1 << 26;
+    /// Largest factor on the noise.
+    pub const MAX_SCALE: f32 = 1e3;
     /// Largest texture side, texels.
     pub const MAX_TEXTURE_SIZE: u32 = 4096;
 
@@ -104,8 +106,9 @@ impl StageSettings for NoiseSettings {
         let mut settings = NoiseSettings::new(profile);
         read_into(table, "method", &mut settings.method, |node| node.choice())?;
         read_into(table, "scale", &mut settings.scale, |node| {
-            let expected = "a number from 0 to 1000";
-            Ok(node.number(expected, |x| (0.0..=1e3).contains(&x))? as f32)
+            let most = f64::from(NoiseSettings::MAX_SCALE);
+            let expected = format!("a number from 0 to {most}");
+            Ok(node.number(&expected, |x| (0.0..=most).contains(&x))? as f32)
         })?;
         read_into(table, "texture_size", &mut settings.texture_size, |node| {
             let most = NoiseSettings::MAX_TEXTURE_SIZE;
