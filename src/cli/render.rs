@@ -14,7 +14,7 @@ use crate::check::{self, Extent};
 use crate::files;
 use crate::output::{
     ExrLayer, ExrLayers, ExrPicture, FilmNote, Format, Metadata, PngBits, Target,
-    check_writable_as, read_film, write_exr, write_film, write_png, write_text,
+    check_writable_as, read_film_if_whole, write_exr, write_film, write_png, write_text,
 };
 use crate::renderer::{
     Budget, Delivered, Goal, Progress, Renderer, RendererOptions, Stats, Watcher,
@@ -42,7 +42,7 @@ pub(super) struct Arguments {
     /// Render only these of each pixel's rays, FROM to TO - 1 (or FROM-LAST), into an .exr that `mixray merge` puts together with the others
     #[arg(long, value_name = "FROM..TO", value_parser = part, conflicts_with_all = ["target_error", "stop_at", "filter"])]
     range: Option<(u32, u32)>,
-    /// With --range: keep the part that is there, if it is this one and whole; a part of another render is an error
+    /// With --range: keep the part that is there, if it is this one and whole; a damaged one is rendered again, a part of another render is an error
     #[arg(long, requires = "range")]
     resume: bool,
     /// Frame number of a video: with [noise], every frame has its own
@@ -150,7 +150,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     let mut renderer = Renderer::new(scene, options, &watcher)?;
     let without = renderer.without();
     if let (true, Some(range), [target]) = (job.resume, job.range, targets.as_slice())
-        && is_kept(target.path(), &renderer, range)?
+        && is_kept(target.path(), &renderer, range, &bar)?
     {
         drop(bar);
         let (from, to) = range;
@@ -225,13 +225,22 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
     })
 }
 
-/// The part is there: of this render, with all of these rays. One that was ended early is not.
-fn is_kept(path: &Path, renderer: &Renderer, range: (u32, u32)) -> Result<bool, Failure> {
+/// The part is there: of this render, with all of these rays. One that was ended early or is damaged is not.
+fn is_kept(
+    path: &Path,
+    renderer: &Renderer,
+    range: (u32, u32),
+    bar: &Bar,
+) -> Result<bool, Failure> {
     if !path.exists() {
         return Ok(false);
     }
     files::read_back(path);
-    let (_, found) = read_film(path)?;
+    let Some((_, found)) = read_film_if_whole(path)? else {
+        let warning = format!("{}: is damaged, and rendered again", path.display());
+        bar.aside(|| say("warning", &warning));
+        return Ok(false);
+    };
     let without = renderer.without().of_films(renderer.gpu_device().is_some());
     let wanted = FilmNote::new(renderer.scene(), range, without);
     let ((from, to), (first, end)) = (range, found.range);

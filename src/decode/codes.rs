@@ -8,7 +8,7 @@ use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
 
 use super::jpeg::{MAX_SCANS, outline, with_standard_tables};
-use super::png::colour_chunks;
+use super::png::{ColourChunks, colour_chunks};
 use super::profile::{ColourProfile, Unused};
 use super::{ALPHA, ImageFile, Pixels, Rgba8, Tags, broken, check_size, ensure_memory};
 
@@ -21,7 +21,7 @@ const GREY: u8 = 128;
 
 pub(super) fn read_png(bytes: &[u8]) -> Result<ImageFile, String> {
     let chunks = colour_chunks(bytes);
-    let mut image = read_codes(bytes, ImageFormat::Png, chunks.cicp, false)?;
+    let mut image = read_codes(bytes, ImageFormat::Png, &chunks, false)?;
     let is_told = image.tags.profile.is_some() || image.warnings.iter().any(|w| w == PROFILE);
     if chunks.has_other_colours && chunks.cicp.is_none() && !is_told {
         let warning = "its gamma and primaries are ignored: it is read as sRGB".to_owned();
@@ -31,13 +31,17 @@ pub(super) fn read_png(bytes: &[u8]) -> Result<ImageFile, String> {
 }
 
 pub(super) fn read_jpeg(bytes: &[u8]) -> Result<ImageFile, String> {
-    read_codes(&checked_jpeg(bytes)?, ImageFormat::Jpeg, None, false)
+    read_codes(
+        &checked_jpeg(bytes)?,
+        ImageFormat::Jpeg,
+        &ColourChunks::default(),
+        false,
+    )
 }
 
 /// What can be decoded of a PNG file that is cut off; the rest is grey.
 pub(super) fn read_cut_png(bytes: &[u8]) -> Result<ImageFile, String> {
-    let cicp = colour_chunks(bytes).cicp;
-    read_codes(bytes, ImageFormat::Png, cicp, true)
+    read_codes(bytes, ImageFormat::Png, &colour_chunks(bytes), true)
 }
 
 /// A PNG decoder that keeps the rows before a fault.
@@ -98,11 +102,11 @@ const PROFILE: &str = "its colour profile is not understood: it is read as sRGB"
 
 const HDR: &str = "its codes are of PQ or HLG (HDR), which is not understood: it is read as sRGB, of which neither light nor colours are right; convert it to OpenEXR";
 
-/// `cicp` wins over an ICC profile; of what `is_cut` off, the rows before are kept.
+/// cICP wins over an ICC profile; of what `is_cut` off, the rows before are kept.
 fn read_codes(
     bytes: &[u8],
     format: ImageFormat,
-    cicp: Option<[u8; 4]>,
+    chunks: &ColourChunks,
     is_cut: bool,
 ) -> Result<ImageFile, String> {
     let (mut decoder, (width, height)) = open(bytes, format)?;
@@ -114,9 +118,10 @@ fn read_codes(
     ensure_decoding(&decoder, (width, height), format, codes + LINEAR_BYTES)?;
     let mut warnings = Vec::new();
     let mut tags = Tags::default();
-    let profile = match (cicp, decoder.icc_profile()) {
+    let profile = match (chunks.cicp, decoder.icc_profile()) {
         (Some(cicp), _) => Some(ColourProfile::of_cicp(cicp)),
         (None, Ok(Some(icc))) => Some(ColourProfile::of_icc(icc)),
+        (None, _) if chunks.has_profile => Some(Err(Unused::NotUnderstood)),
         (None, _) => None,
     };
     match profile {

@@ -30,13 +30,21 @@ impl ChannelFile {
     /// # Errors
     /// Why it cannot be read, in one line that begins with the path.
     pub fn read(path: &Path) -> Result<Self, Refusal> {
-        let read = || {
-            let bytes = read_file(path, MAX_PICTURE_BYTES).map_err(|reason| {
-                format!("it cannot be read ({reason}); expected an .exr file; correct the path or the rights")
-            })?;
-            Self::decode(&bytes)
-        };
-        read().map_err(|problem: Refusal| format!("{}: {problem}", path.display()).into())
+        Self::decode(&Self::bytes_of(path)?)
+            .map_err(|problem| format!("{}: {problem}", path.display()).into())
+    }
+
+    /// The bytes of an OpenEXR file.
+    ///
+    /// # Errors
+    /// As [`ChannelFile::read`].
+    pub(crate) fn bytes_of(path: &Path) -> Result<Vec<u8>, Refusal> {
+        Ok(read_file(path, MAX_PICTURE_BYTES).map_err(|reason| {
+            format!(
+                "{}: it cannot be read ({reason}); expected an .exr file; correct the path or the rights",
+                path.display()
+            )
+        })?)
     }
 
     /// Decodes the bytes of an OpenEXR file.
@@ -103,13 +111,25 @@ pub(super) fn read_picture(
     {
         warnings.push("its chromaticities are ignored: it is read as linear Rec.709".to_owned());
     }
+    let wide = header.shared_attributes.pixel_aspect;
+    if (wide - 1.0).abs() > 1e-3 {
+        warnings.push(format!(
+            "its pixels are {wide} times as wide as high: give the camera `fx` and `fy` of its own pixels, not a field of view"
+        ));
+    }
     if alpha.is_some() && !with_alpha {
         warnings.push(ALPHA.to_owned());
     }
     let mut wanted = rgb.to_vec();
     wanted.extend(alpha.filter(|_| with_alpha));
     wanted.dedup();
-    ensure_memory((width, height), 12)?;
+    let kept = if alpha.is_some() && with_alpha {
+        16
+    } else {
+        12
+    };
+    // The planes are there until the pixels are.
+    ensure_memory((width, height), kept + 4 * wanted.len() as u64)?;
     let planes: Vec<Vec<f32>> = read_part(bytes, &headers, part, &wanted)?
         .into_iter()
         .map(into_f32)

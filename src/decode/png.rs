@@ -11,6 +11,8 @@ const SAME_CHROMATICITY: u32 = 200;
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct ColourChunks {
     pub cicp: Option<[u8; 4]>,
+    /// A profile is there, whether or not it can be unpacked.
+    pub has_profile: bool,
     /// A gamma or primaries that are not sRGB's and nothing that speaks for them.
     pub has_other_colours: bool,
 }
@@ -31,6 +33,7 @@ pub(super) fn colour_chunks(bytes: &[u8]) -> ColourChunks {
         };
         match name {
             b"cICP" => found.cicp = data.try_into().ok(),
+            b"iCCP" => found.has_profile = true,
             b"sRGB" => srgb = true,
             b"gAMA" => other |= !numbers().all(|gamma| SRGB_GAMMA.contains(&gamma)),
             b"cHRM" => {

@@ -79,6 +79,11 @@ pub(crate) fn is_sealed(file: &[u8]) -> bool {
     hash.finalize().to_hex().as_bytes() == &file[at..at + SEAL_DIGITS]
 }
 
+/// The file was sealed once, and some byte has changed since.
+pub(super) fn is_seal_broken(file: &[u8]) -> bool {
+    seal_at(file).is_some() && !is_sealed(file)
+}
+
 /// Where the digits stand. The zero bytes of name and type are in no text before them.
 fn seal_at(file: &[u8]) -> Option<usize> {
     let head = [SEAL.as_bytes(), b"\0string\0"].concat();

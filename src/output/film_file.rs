@@ -7,6 +7,7 @@ use bytemuck::Zeroable;
 use super::ChannelFile;
 use super::channels::{Channels, push_channel};
 use super::exr_file::write_layers;
+use super::exr_header::is_seal_broken;
 use super::film_note::{FORM, FilmNote, NOTE, NOTE_OF_FORM_1};
 use super::{ExrPicture, OutputError, Target};
 use crate::film::{Film, GroupSums, GuideSums, PixelSums, SplatSums, Sum3};
@@ -66,10 +67,34 @@ fn folder_of(path: &Path) -> &Path {
 /// The film of a file that [`write_film`] wrote.
 ///
 /// # Errors
-/// In one line: the file cannot be read, holds no film or one of another form, or sums that are not finite.
+/// In one line: the file cannot be read, has changed since it was written, holds no film or one of another form, or sums that are not finite.
 pub fn read_film(path: &Path) -> Result<(Film, FilmNote), Refusal> {
-    let file = ChannelFile::read(path)?;
+    film_in(&ChannelFile::bytes_of(path)?, path)
+}
+
+/// As [`read_film`]; `None`: what is there is such a film, or nothing at all, that was damaged.
+///
+/// # Errors
+/// As [`read_film`], but for damages.
+#[cfg(feature = "cli")]
+pub(crate) fn read_film_if_whole(path: &Path) -> Result<Option<(Film, FilmNote)>, Refusal> {
+    let bytes = ChannelFile::bytes_of(path)?;
+    let is_blank = bytes.iter().all(|byte| *byte == 0);
+    let has_note = || (bytes.windows(NOTE.len())).any(|window| window == NOTE.as_bytes());
+    if is_blank || is_seal_broken(&bytes) && has_note() {
+        return Ok(None);
+    }
+    film_in(&bytes, path).map(Some)
+}
+
+fn film_in(bytes: &[u8], path: &Path) -> Result<(Film, FilmNote), Refusal> {
     let refused = |problem: String| Refusal::from(format!("{}: {problem}", path.display()));
+    if is_seal_broken(bytes) {
+        let problem =
+            "it is not as it was written; expected a whole film; it is damaged: render it again";
+        return Err(refused(problem.to_owned()));
+    }
+    let file = ChannelFile::decode(bytes).map_err(|problem| refused(problem.to_string()))?;
     let Some(text) = file.texts.get(NOTE) else {
         return Err(refused(match file.texts.contains_key(NOTE_OF_FORM_1) {
             true => format!("is a film written by mixray of an earlier form; expected form {FORM}; render it again"),

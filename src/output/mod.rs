@@ -22,6 +22,8 @@ pub use exr_file::write_exr;
 pub(crate) use exr_header::is_sealed;
 pub use exr_picture::ExrPicture;
 pub(crate) use extension::{check_folder_name, extension_among};
+#[cfg(feature = "cli")]
+pub(crate) use film_file::read_film_if_whole;
 pub use film_file::{read_film, write_film};
 pub use film_note::FilmNote;
 pub use layers::{ExrLayer, ExrLayers};

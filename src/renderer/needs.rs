@@ -1,10 +1,13 @@
 //! What a render will take, held against the memory that there is before it is taken.
 
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use crate::cpu::contribution::photons_traced;
 use crate::film::{GroupSums, GuideSums, PixelSums, SplatSums};
 use crate::memory::{Shortage, ensure, ensure_lazy};
 use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
-use crate::scene::{EnvironmentMap, Scene};
+use crate::scene::{EnvironmentMap, Scene, Texture};
 
 /// Of a triangle at least, in the packed scene and its tree, while the tree is built.
 const TRIANGLE_BYTES: u64 = 300;
@@ -28,6 +31,7 @@ pub(super) fn ensure_scene(scene: &Scene, guides: bool, grouped: bool) -> Result
             .map(|instance| instance.primitive.triangles.len() as u64)
             .sum(),
     )?;
+    ensure(texture_bytes(scene), "packing the textures")?;
     if let Some(EnvironmentMap::LatLong { texels, .. }) = scene.environment.as_ref().map(|e| &e.map)
     {
         let bytes = texels.len() as u64 * ENVIRONMENT_TEXEL_BYTES;
@@ -38,6 +42,17 @@ pub(super) fn ensure_scene(scene: &Scene, guides: bool, grouped: bool) -> Result
     let shown = pixels * (PICTURE_BYTES + if guides { PLANES_BYTES } else { 0 });
     let mapped = shown + pixels * film_bytes(guides, grouped);
     ensure_lazy(mapped, shown, &picture(width, height))
+}
+
+/// Packed one after the other, in an array that doubles as it grows.
+fn texture_bytes(scene: &Scene) -> u64 {
+    let instances = scene.objects.iter().flat_map(|object| &object.instances);
+    let textures: HashMap<*const Texture, u64> = instances
+        .flat_map(|instance| instance.material.textures())
+        .map(|r| (Arc::as_ptr(&r.texture), r.texture.rgba8.len() as u64))
+        .collect();
+    let bytes = textures.values().sum::<u64>() * size_of::<u32>() as u64;
+    if textures.len() > 1 { 2 * bytes } else { bytes }
 }
 
 /// Before the film is made: of its pixels only those within reach are ever written.

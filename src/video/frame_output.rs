@@ -7,10 +7,10 @@ use crate::files::final_target;
 use crate::output::{Format, OutputError, check_folder_name, extension_among};
 use crate::scene::trajectory::FrameName;
 
-/// What an output may be, for whoever named another.
 /// The note of a render in its folder of frames.
 pub(super) const FOLDER_NOTE: &str = "mixray-sequence.json";
 
+/// What an output may be, for whoever named another.
 const EXPECTED: &str = "a folder for the frames, a pattern like out.####.exr or out.####.png, a file that ends in .y4m, or - for a stream";
 /// Most digits of a pattern.
 const MAX_DIGITS: usize = 9;

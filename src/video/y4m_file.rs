@@ -106,7 +106,9 @@ impl Y4mFile {
     /// A whole file lacks frames: it grows again.
     fn go_on(&mut self) -> Result<(), VideoError> {
         let Paths { path, part } = &self.paths;
-        std::fs::rename(path, part)
+        // One that may not be written keeps its name.
+        (File::options().write(true).open(path))
+            .and_then(|_| std::fs::rename(path, part))
             .map_err(|error| Place::File(path.clone()).error(cannot_write(&error)))?;
         self.open_part(None)
     }

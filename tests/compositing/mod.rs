@@ -192,3 +192,29 @@ fn the_composite_is_opaque_and_half_of_the_channels_are_half_floats() {
     assert_eq!(type_of("A"), None);
     assert_eq!(type_of("ratio.R"), None, "the composite is additive");
 }
+
+/// Of 32-bit floats without compression.
+#[test]
+fn files_are_a_quarter_of_their_planes() {
+    const SIZE: [u32; 2] = [288, 192];
+    let folder = Folder::with_scene(&SCENE.replace("[noise]\nprofile = \"noise.toml\"\n", ""));
+    folder.save("photo.png", SIZE[0], SIZE[1], |x, y| {
+        [230, 220, 205].map(|c| (c - (x * 7 + y * 13) % 11) as u8)
+    });
+    let size_of = |name: &str, layers: &str| {
+        folder.succeed(&format!("render scene.toml -o {name} {layers}"));
+        let path = folder.path(name);
+        let meta = exr::meta::MetaData::read_from_file(&path, true).expect("reads");
+        let channels = meta.headers[0].channels.list.len();
+        let planes = channels * (4 * SIZE[0] * SIZE[1]) as usize;
+        (folder.bytes(name).len(), planes)
+    };
+    let (all, planes) = size_of("all.exr", "");
+    assert!(4 * all < planes, "{all} of {planes} bytes");
+    let (three, _) = size_of("three.exr", "--layers composite,virtual,change");
+    assert!(2 * three < all, "{three} of {all} bytes");
+    // Twice the planes are no smaller.
+    let costly = "--layers composite,difference,virtual,change,mask,depth,normal,variance,samples,albedo,real,mixed";
+    let (more, _) = size_of("more.exr", costly);
+    assert!(more > all, "control: {more} of {all} bytes");
+}

@@ -1,5 +1,6 @@
 //! What is done to the program that nobody should: damaged files, files without an end, little memory, no threads, small stacks.
 
+mod bombs;
 mod decoders;
 pub mod fuzz;
 mod fuzzed;

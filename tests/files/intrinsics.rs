@@ -350,3 +350,64 @@ fn fisheyes_of_scene_files() {
     folder.write("scene.toml", scene(open).replace("fx = 20", "fx = 28"));
     folder.succeed("render scene.toml -o out.png");
 }
+
+/// Words that other programs have for the projection, the coefficients and the camera matrix.
+#[test]
+fn words_of_other_programs_for_lens_and_matrix() {
+    let folder = wide_folder();
+    let focal = r#""fl_x": 20.0, "fl_y": 20.0, "cx": 32.0, "cy": 24.0,"#;
+    let transforms = |more: &str| {
+        folder.write(
+            "transforms.json",
+            format!(
+                r#"{{{more} "w": 64, "h": 48, "frames": [{{"file_path": "images/f_0000.png", "transform_matrix": [[1,0,0,3],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}}]}}"#
+            ),
+        );
+    };
+    let x = |more: &str| {
+        transforms(&format!("{focal}{more}"));
+        folder.sequence_of("frames", "transforms.json", "");
+        folder.ball_at("f_0000.png")[0]
+    };
+    let pinhole = x("");
+    assert!((pinhole - EQUIDISTANT).abs() > 3.0, "control: {pinhole}");
+    for more in [
+        r#""lens": "fisheye","#,
+        r#""projection_type": "equidistant","#,
+    ] {
+        assert!((x(more) - EQUIDISTANT).abs() < 0.5, "{more}");
+    }
+    for more in [
+        r#""lens": "Sigma 15mm","#,
+        r#""latlong": false,"#,
+        r#""dist": 3.2,"#,
+        r#""K": [[20, 0, 32], [0, 20, 24], [0, 0, 1]],"#,
+    ] {
+        assert_eq!(x(more), pinhole, "{more}");
+    }
+    let bent = x(r#""k1": 0.2,"#);
+    assert_ne!(bent, pinhole, "control");
+    for more in [r#""dist": [0.2, 0, 0, 0],"#, r#""D": [0.2, 0, 0, 0],"#] {
+        assert_eq!(x(more), bent, "{more}");
+    }
+    for (more, part) in [
+        (r#""ftheta_p0": 0.1, "ftheta_p1": 0.05,"#, "ftheta_p0"),
+        (r#""latlong": true,"#, "latlong"),
+        (r#""is_equirectangular": true,"#, "equirectangular"),
+        (r#""orthographic": 1,"#, "orthographic"),
+    ] {
+        transforms(&format!("{focal}{more}"));
+        folder.refuse_sequence_of("frames", "transforms.json", part);
+    }
+    // The scene's own focal length would stand in for what the file says.
+    folder.write(
+        "scene.toml",
+        ball(0.4).replace("[camera]\n", "[camera]\nfx = 20\n"),
+    );
+    for matrix in ["K", "intrinsics", "camera_matrix"] {
+        transforms(&format!(
+            r#""{matrix}": [[30, 0, 32], [0, 30, 24], [0, 0, 1]],"#
+        ));
+        folder.refuse_sequence_of("frames", "transforms.json", &format!("`{matrix}`"));
+    }
+}

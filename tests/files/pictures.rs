@@ -371,3 +371,46 @@ fn layers() {
         assert_eq!(out.get_pixel(0, 0).0, [60; 3], "control: {mask}");
     }
 }
+
+/// Houdini's, RenderMan's and Unreal's names of the picture; pixels that are not square.
+#[test]
+fn exr_of_other_programs() {
+    let folder = folder("p.exr", "");
+    let file = |layer: &str| {
+        let mut channels = rgb("albedo.", 0.9);
+        channels.extend(rgb(layer, 0.05));
+        exr(vec![part(None, &borrowed(&channels), (64, 48))])
+    };
+    for layer in ["C.", "Ci.", "FinalImage.", "beauty.", "RGBA."] {
+        folder.write("p.exr", file(layer));
+        assert_eq!(corner(&folder), 63, "{layer}");
+    }
+    folder.write("p.exr", file("diffuse."));
+    folder.refuse("render scene.toml -o out.png", "several pictures");
+
+    let mut image = Image::from_layers(
+        ImageAttributes::new(IntegerBounds::from_dimensions((64, 48))),
+        vec![part(None, &borrowed(&rgb("", 0.05)), (64, 48))],
+    );
+    for (aspect, is_told) in [(1.0, false), (2.0, true)] {
+        image.attributes.pixel_aspect = aspect;
+        let mut bytes = Cursor::new(Vec::new());
+        image.write().to_buffered(&mut bytes).expect("encodes");
+        folder.write("p.exr", bytes.into_inner());
+        let said = render(&folder);
+        assert_eq!(said.contains("2 times as wide as high"), is_told, "{said}");
+    }
+}
+
+#[test]
+fn profiles_that_cannot_be_unpacked_are_told() {
+    let folder = folder("p.png", "");
+    folder.write("p.png", with_chunks(&[(b"iCCP", b"x\0\0no zlib stream")]));
+    let said = render(&folder);
+    assert!(
+        said.contains("its colour profile is not understood"),
+        "{said}"
+    );
+    folder.write("p.png", with_chunks(&[(b"tEXt", b"x\0\0no zlib stream")]));
+    assert!(!render(&folder).contains("profile"), "control");
+}

@@ -3,6 +3,7 @@
 mod animation;
 mod blur;
 mod copies;
+mod damages;
 mod errors;
 mod flicker;
 mod frames;

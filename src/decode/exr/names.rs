@@ -1,11 +1,11 @@
-//! Which channels of an OpenEXR file are a picture: names of Nuke, Blender and others.
+//! Which channels of an OpenEXR file are a picture: names of Nuke, Blender, Houdini (C), RenderMan (Ci), Unreal (FinalImage) and others.
 
 use ::exr::meta::header::Header;
 
 use super::text_of;
 
 /// Names of a layer or part that hold the picture as such.
-const PICTURE_NAMES: [&str; 7] = [
+const PICTURE_NAMES: [&str; 10] = [
     "rgba",
     "rgb",
     "beauty",
@@ -13,6 +13,9 @@ const PICTURE_NAMES: [&str; 7] = [
     "composite",
     "color",
     "main",
+    "c",
+    "ci",
+    "finalimage",
 ];
 
 /// What programs call red, green, blue and alpha, in small letters.

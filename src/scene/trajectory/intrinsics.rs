@@ -115,6 +115,9 @@ const OTHER_MODELS: [&str; 10] = [
     "unified",
 ];
 
+/// Keys of instant-ngp that each name a projection by being there, without `is_` before them.
+const PROJECTION_KEYS: [&str; 3] = ["latlong", "equirectangular", "orthographic"];
+
 /// The lens models of OpenCV under all of their names, from the least to the most special.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum LensModel {
@@ -181,7 +184,11 @@ impl LensModel {
                 Some(Self::named(&value)?)
             } else if key.contains("fisheye") && is_true() {
                 Some(Self::Fisheye)
-            } else if ["model", "type", "projection"]
+            } else if key.starts_with("ftheta")
+                || PROJECTION_KEYS.contains(&key.trim_start_matches("is_")) && is_true()
+            {
+                return Self::named(&key).map(Some);
+            } else if ["model", "type", "projection", "lens"]
                 .iter()
                 .any(|word| key.contains(word))
             {

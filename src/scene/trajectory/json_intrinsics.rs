@@ -82,6 +82,9 @@ impl Style {
         let side = |key: &str| u32::try_from(table.get(key)?.as_f64()? as u64).ok();
         let centre = |key: &str| Ok::<_, String>(optional(key)?.map(|x| x + centre_offset));
         let model = model_of(table)?;
+        if !table.contains_key(focal[0]) {
+            refuse_matrices(table, focal[0])?;
+        }
         Ok(Fields {
             model,
             width: side(size[0]),
@@ -105,6 +108,16 @@ const LISTS: [&str; 5] = [
     "dist_coeffs",
     "coeffs",
 ];
+/// Lists too, where they are lists: short names may mean something else.
+const SHORT_LISTS: [&str; 2] = ["dist", "D"];
+/// A camera matrix, which no style of these has.
+const MATRICES: [&str; 5] = [
+    "K",
+    "intrinsics",
+    "intrinsic_matrix",
+    "camera_matrix",
+    "camera_intrinsics",
+];
 /// nerfstudio's list.
 const PARAMS: &str = "distortion_params";
 const ORDER_OF_PARAMS: [&str; 6] = ["k1", "k2", "k3", "k4", "p1", "p2"];
@@ -123,8 +136,12 @@ fn coefficients(table: &Object, is_fisheye: bool) -> Problem<[Option<f64>; 12]> 
         let values = values.ok_or_else(|| not_understood(PARAMS))?;
         return in_order(values, &ORDER_OF_PARAMS);
     }
+    let short = SHORT_LISTS
+        .iter()
+        .filter(|key| table.get(**key).is_some_and(Value::is_array));
     let list = LISTS
         .iter()
+        .chain(short)
         .find_map(|key| Some((*key, table.get(*key)?)))
         .filter(|(_, value)| !value.is_null());
     let named = match list {
@@ -165,6 +182,19 @@ fn not_understood(key: &str) -> String {
     format!(
         "`{key}` is not understood; expected OpenCV's coefficients side by side (k1, k2, p1, ...), or `distortion` as a list of 4, 5, 8 or 12 of them; correct it"
     )
+}
+
+/// A camera matrix in place of focal lengths would be left out.
+fn refuse_matrices(table: &Object, focal: &str) -> Problem<()> {
+    let is_matrix =
+        |key: &&&str| matches!(table.get(**key), Some(Value::Array(_) | Value::Object(_)));
+    match MATRICES.iter().find(is_matrix) {
+        None => Ok(()),
+        Some(key) => Err(format!(
+            "`{key}` is not understood; expected focal lengths and a principal point as `{focal}`, `{}`, `cx` and `cy`, pixels; write them out",
+            focal.replace('x', "y")
+        )),
+    }
 }
 
 /// A distortion by a name that is not known would be left out.
