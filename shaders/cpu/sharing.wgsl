@@ -1,7 +1,7 @@
 // Second vertices shared between pixels, where the weights are derived. Rust twin: src/cpu/sharing.rs.
 
 import package::gpu::buffers::frame;
-import package::gpu::lanes::{batch, work};
+import package::gpu::lanes::work_of;
 import package::shared::NONE;
 import package::packed::records::{SIDE_REAL, SIDE_VIRTUAL};
 import package::work::list::TILE_PLACES;
@@ -91,12 +91,12 @@ fn link_of(kind: u32, source: u32, receiver: u32) -> u32 {
 
 // Number of a lane's pixel in its tile.
 fn number_of(lane: u32) -> u32 {
-    return member_of(frame.width, work[lane % batch.pixel_count].pixel);
+    return member_of(frame.width, work_of(lane).pixel);
 }
 
 // The first lane of the tile's samples of equal number, and how many there are.
 fn tile_lanes(lane: u32) -> vec2<u32> {
-    let tile = work[lane % batch.pixel_count].tile;
+    let tile = work_of(lane).tile;
     return vec2<u32>(lane - tile % TILE_PLACES, tile / TILE_PLACES);
 }
 

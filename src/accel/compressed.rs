@@ -13,6 +13,8 @@ use obvhs::{
     cwbvh::{bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode},
 };
 
+use super::binary::padded_boxes;
+
 /// Levels that the shader's stack serves.
 pub(super) const MAX_LEVELS: usize = 24;
 
@@ -33,6 +35,7 @@ pub(super) struct CompressedBvh {
     pub(super) levels: u32,
     /// Around all triangles, enlarged; `None` without any.
     bounds: Option<Aabb>,
+    place: Place,
 }
 
 /// Where in a world's arrays the nodes below a tree's root and its triangles stand.
@@ -89,6 +92,7 @@ impl CompressedBvh {
             leaves: Vec::new(),
             levels: 1,
             bounds: None,
+            place: Place::FIRST,
         }
     }
 
@@ -153,7 +157,44 @@ impl CompressedBvh {
             leaves,
             levels: levels as u32,
             bounds: node_boxes.first().copied(),
+            place,
         })
+    }
+
+    /// Moves the triangles, of which there are as many as before; the tree keeps its shape.
+    pub(super) fn refit(&mut self, triangles: &[[Vec3; 3]], first_id: u32) {
+        let enlarged = padded_boxes(triangles);
+        let mut ids = Vec::with_capacity(triangles.len());
+        for leaf in self.leaves.chunks_exact_mut(3) {
+            let id = leaf[0][3].to_bits() - first_id;
+            for (row, corner) in leaf.iter_mut().zip(triangles[id as usize]) {
+                row[..3].copy_from_slice(&corner.to_array());
+            }
+            ids.push(id);
+        }
+        if ids.is_empty() {
+            return;
+        }
+        let nodes: &mut [CwBvhNode] = bytemuck::cast_slice_mut(&mut self.nodes);
+        let mut node_boxes = vec![Aabb::empty(); nodes.len()];
+        // Children stand after their parents.
+        for index in (0..nodes.len()).rev() {
+            let node = CwBvhNode {
+                child_base_idx: nodes[index].child_base_idx - (self.place.node - 1),
+                primitive_base_idx: nodes[index].primitive_base_idx - self.place.triangle,
+                ..nodes[index]
+            };
+            let boxes = std::array::from_fn(|slot| match child(&node, slot) {
+                Child::None => None,
+                Child::Node(child) => Some(node_boxes[child]),
+                Child::Leaf(range) => ids[range]
+                    .iter()
+                    .map(|&id| enlarged[id as usize])
+                    .reduce(|a, b| a.union(&b)),
+            });
+            node_boxes[index] = compress(&mut nodes[index], &boxes);
+        }
+        self.bounds = node_boxes.first().copied();
     }
 }
 

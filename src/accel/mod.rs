@@ -122,6 +122,11 @@ impl WorldBvh {
         self.resting.refit(triangles)
     }
 
+    /// Triangles have come so far by [`WorldBvh::refit`] that rays would be faster in a tree built anew.
+    pub fn is_worn(&self) -> bool {
+        self.resting.is_worn()
+    }
+
     /// Replaces the triangles that move, whose ids follow those that rest; what rests is not touched.
     ///
     /// # Errors

@@ -11,6 +11,9 @@ use super::wide::WideBvh;
 use super::{AccelError, MAX_COORDINATE_M, MAX_TRIANGLES};
 use crate::shared::NONE;
 
+/// Growth of a tree's boxes beside the whole, and so of what a ray costs, up to which moving its triangles is cheaper than building it anew.
+const WORN: f32 = 1.2;
+
 pub(super) struct Tree {
     pub(super) wide: WideBvh,
     /// What the GPU's tree is made from, until it is.
@@ -18,6 +21,8 @@ pub(super) struct Tree {
     triangles: Vec<[Vec3; 3]>,
     first_id: u32,
     compressed: OnceLock<CompressedBvh>,
+    /// [`WideBvh::surface`] as it was built; `None` until triangles are moved.
+    built_surface: Option<f32>,
     /// Smallest and largest vertex coordinates; `None` without triangles.
     pub(super) bounds: Option<(Vec3, Vec3)>,
 }
@@ -47,6 +52,7 @@ impl Tree {
             triangles: triangles.to_vec(),
             first_id,
             compressed: OnceLock::new(),
+            built_surface: None,
             bounds,
         })
     }
@@ -60,12 +66,20 @@ impl Tree {
             return Ok(false);
         }
         self.bounds = bounds_of(triangles)?;
+        self.built_surface.get_or_insert(self.wide.surface());
         self.wide.refit(triangles, self.first_id);
         self.triangles.copy_from_slice(triangles);
-        // A device that asks for its tree has it built anew.
+        // A device that asks for its tree later has it built anew.
         self.binary = Mutex::new(None);
-        self.compressed = OnceLock::new();
+        if let Some(compressed) = self.compressed.get_mut() {
+            compressed.refit(triangles, self.first_id);
+        }
         Ok(true)
+    }
+
+    /// As [`super::WorldBvh::is_worn`].
+    pub(super) fn is_worn(&self) -> bool {
+        (self.built_surface).is_some_and(|built| self.wide.surface() > WORN * built)
     }
 
     /// The first id after those of this tree.

@@ -103,6 +103,25 @@ impl WideBvh {
         }
     }
 
+    /// Surface of all children's boxes over that of the root: nodes that a ray through the root meets on average (Goldsmith and Salmon,
+    /// "Automatic creation of object hierarchies for ray tracing", 1987).
+    pub(super) fn surface(&self) -> f32 {
+        let (mut sum, mut root) = (0.0f64, 0.0f64);
+        for (index, node) in self.nodes.iter().enumerate() {
+            let mut whole = Aabb::empty();
+            for slot in (0..WIDTH).filter(|&slot| node.children[slot] != LEAF) {
+                let corner = |side: usize| node.planes.map(|axis| axis[side][slot]);
+                let child = Aabb::new(corner(0).into(), corner(1).into());
+                sum += f64::from(child.half_area());
+                whole = whole.union(&child);
+            }
+            if index == 0 {
+                root = f64::from(whole.half_area());
+            }
+        }
+        if root > 0.0 { (sum / root) as f32 } else { 0.0 }
+    }
+
     /// Moves the triangles; the tree keeps its shape.
     pub(super) fn refit(&mut self, triangles: &[[Vec3; 3]], first_id: u32) {
         let boxes = padded_boxes(triangles);

@@ -162,6 +162,8 @@ fn heads() -> Vec<String> {
         "MB up",
         "MB down",
         "dispatches",
+        "steps",
+        "idle",
         "submissions",
         "waits",
     ];
@@ -185,6 +187,8 @@ fn cells(frame: &GpuFrame) -> Vec<String> {
         mb(traffic.bytes_up),
         mb(traffic.bytes_down),
         traffic.dispatches.to_string(),
+        traffic.steps.to_string(),
+        traffic.idle_steps.to_string(),
         traffic.submissions.to_string(),
         traffic.waits.to_string(),
     ]);

@@ -144,6 +144,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         without: job.flags.without(),
         filter: job.flags.goal.filter,
         draft: false,
+        beside_window: false,
     };
     let hear = |progress: &Progress| bar.hear(progress);
     let watcher = Watcher::none().heard_by(&hear);

@@ -245,11 +245,31 @@ impl GpuDevice {
     ///
     /// # Errors
     /// [`GpuError::Lost`].
-    pub fn submit(&self, encoder: wgpu::CommandEncoder, dispatches: u64) -> Result<(), GpuError> {
+    pub fn submit(
+        &self,
+        encoder: wgpu::CommandEncoder,
+        dispatches: u64,
+    ) -> Result<wgpu::SubmissionIndex, GpuError> {
         count(&self.traffic.submissions, 1);
         count(&self.traffic.dispatches, dispatches);
-        self.queue.submit([encoder.finish()]);
-        self.check()
+        let index = self.queue.submit([encoder.finish()]);
+        self.check()?;
+        Ok(index)
+    }
+
+    /// So many steps of batches were recorded, of which so many were needed.
+    pub(super) fn count_steps(&self, recorded: u64, needed: u64) {
+        count(&self.traffic.steps, recorded);
+        count(&self.traffic.idle_steps, recorded.saturating_sub(needed));
+    }
+
+    /// Waits for the end of a submission, and of those before it.
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`].
+    pub fn wait_for(&self, index: &wgpu::SubmissionIndex) -> Result<(), GpuError> {
+        count(&self.traffic.waits, 1);
+        self.wait(Some(index.clone()))
     }
 
     /// Submits and waits for the end.
@@ -401,8 +421,8 @@ mod tests {
             bytes_up: 4 * 999,
             bytes_down: 4 * 500,
             submissions: 1,
-            dispatches: 0,
             waits: 1,
+            ..Traffic::default()
         };
         assert_eq!(gpu.traffic() - before, traffic);
     }

@@ -1,23 +1,24 @@
-//! The buffers of a batch of samples in flight: bind group 1, as `shaders/gpu/lanes.wgsl` declares it, and the parts of the samples' states,
-//! bind group 2, as `shaders/cpu/state.wgsl` does.
+//! The buffers of the samples in flight: the part of bind group 1 (`shaders/gpu/lanes.wgsl`) that batches share, and the parts of the samples'
+//! states, bind group 2, as `shaders/cpu/state.wgsl` declares them.
 
 use std::collections::BTreeMap;
 use std::mem::offset_of;
 
-use bytemuck::{AnyBitPattern, NoUninit, Pod, Zeroable};
+use bytemuck::{AnyBitPattern, Pod, Zeroable};
 
 use super::kernel::Kernel;
 use super::{GpuDevice, GpuError};
-use crate::film::{Film, GroupSums, GuideSums, PixelSums};
 use crate::shared::{WORKGROUP, shared};
-use crate::work::{PixelWork, SampleRays};
+use crate::work::SampleRays;
 
 shared! {
-    /// Uniform of a batch.
-    #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+    /// Samples that are in flight at once.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
     pub struct Batch {
-        /// Lane l is sample l / pixel_count of the pixel in slot l % pixel_count.
+        /// Lane l is sample l / pixel_count of the pixel in slot first_slot + l % pixel_count.
+        pub first_slot: u32,
         pub pixel_count: u32,
+        /// 0: there is no batch any more.
         pub lane_count: u32,
         /// Samples of each pixel that earlier batches of the same pixels have taken.
         pub sample_offset: u32,
@@ -25,39 +26,88 @@ shared! {
         /// 1: the real radiance alone.
         pub real_pass: u32,
         pub with_guides: u32,
+        pub with_groups: u32,
         /// Stays 0; the shader hides intermediate sums from the compiler with it.
         pub zero: u32,
-        pub with_groups: u32,
     }
 
     /// Places in the shader's `counters`, which are words: of [`Counters::lanes_in`] and so on.
     const COUNT_IN: u32 = word(offset_of!(Counters, lanes_in));
     const COUNT_OUT: u32 = word(offset_of!(Counters, lanes_out));
-    const COUNT_STEPS: u32 = word(offset_of!(Counters, steps));
-    const COUNT_RAYS: u32 = word(offset_of!(Counters, rays));
+    const COUNT_BEGUN: u32 = word(offset_of!(Counters, begun));
+    const COUNT_IS_OPEN: u32 = word(offset_of!(Counters, is_open));
+    const COUNT_IS_DONE: u32 = word(offset_of!(Counters, is_done));
+    const COUNT_RECORD: u32 = word(offset_of!(Counters, record));
+    const COUNT_STEPS: u32 = word(offset_of!(Counters, record) + offset_of!(BatchRecord, lane_steps));
+    const COUNT_TURNS: u32 = word(offset_of!(Counters, record) + offset_of!(BatchRecord, steps));
+    const COUNT_RAYS: u32 = word(offset_of!(Counters, record) + offset_of!(BatchRecord, rays));
+    const COUNT_ALIVE: u32 = word(offset_of!(Counters, record) + offset_of!(BatchRecord, alive));
     const COUNTERS: u32 = word(size_of::<Counters>());
     const RAY_KINDS: u32 = word(size_of::<SampleRays>());
+    /// Steps of a batch whose lanes are counted one by one.
+    const ALIVE_TURNS: u32 = 32;
+
+    /// Words before the records in the shader's `records`, and of one.
+    const RECORDS_HEAD: u32 = word(size_of::<RecordsHead>());
+    const RECORD_WORDS: u32 = word(size_of::<BatchRecord>());
+
+    /// Places in the shader's `indirect`, whose words say how many workgroups a dispatch has.
+    pub const FOR_GENERATE: u32 = 0;
+    pub const FOR_STEP: u32 = 3;
+    pub const FOR_SHARE: u32 = 6;
+    pub const FOR_SUM: u32 = 9;
+    const INDIRECT_WORDS: u32 = 12;
 }
 
 const fn word(bytes: usize) -> u32 {
     bytes as u32 / 4
 }
 
-/// What the device counts while a batch runs.
+/// What the device counts.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, AnyBitPattern)]
-pub struct Counters {
-    pub lanes_in: u32,
-    pub lanes_out: u32,
-    pub steps: u32,
-    pub rays: SampleRays,
+struct Counters {
+    lanes_in: u32,
+    lanes_out: u32,
+    /// Batches that were opened.
+    begun: u32,
+    /// 1: the last of them is not closed.
+    is_open: u32,
+    /// 1: it was summed.
+    is_done: u32,
+    record: BatchRecord,
 }
 
-pub const COUNTERS_BYTES: u64 = size_of::<Counters>() as u64;
-const SUMS_BYTES: u64 = size_of::<PixelSums>() as u64;
-const GUIDE_BYTES: u64 = size_of::<GuideSums>() as u64;
-const GROUP_BYTES: u64 = size_of::<GroupSums>() as u64;
-const WORK_BYTES: u64 = size_of::<PixelWork>() as u64;
+/// What a batch came to.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, AnyBitPattern)]
+pub struct BatchRecord {
+    /// Steps of all lanes.
+    pub lane_steps: u32,
+    /// Steps in which a lane was alive.
+    pub steps: u32,
+    pub rays: SampleRays,
+    /// Lanes alive at the beginning of each of the first steps.
+    pub alive: [u32; ALIVE_TURNS as usize],
+}
+
+/// How far the batches have come.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, AnyBitPattern)]
+pub struct RecordsHead {
+    /// Batches whose records follow.
+    pub closed: u32,
+    /// Of the batch after those.
+    pub lanes_alive: u32,
+}
+
+const COUNTERS_BYTES: u64 = size_of::<Counters>() as u64;
+const BATCH_BYTES: u64 = size_of::<Batch>() as u64;
+/// Batches that the device may go through in one go.
+pub const MOST_BATCHES: usize = 255;
+/// Of the states of all samples in flight, with their queues.
+const MOST_STATE_BYTES: u64 = 512 << 20;
+/// A lane's place in both queues.
+const QUEUES_BYTES: u64 = 8;
 
 /// Bind group of the parts of a sample's state.
 pub(super) const PARTS_GROUP: u32 = 2;
@@ -72,51 +122,30 @@ pub fn state_parts(kernels: &[Kernel]) -> BTreeMap<String, u64> {
         .collect()
 }
 
-/// What a film may have of a pixel beside its sums.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Beside {
-    pub guides: bool,
-    pub groups: bool,
-}
-
-impl Beside {
-    pub fn of(film: &Film) -> Self {
-        Self {
-            guides: !film.guides.is_empty(),
-            groups: !film.groups.is_empty(),
-        }
-    }
-}
-
 /// Buffers for up to `capacity` lanes.
 pub struct Lanes {
     pub capacity: usize,
-    pub beside: Beside,
-    pub batch: wgpu::Buffer,
-    pub work: wgpu::Buffer,
+    batches: wgpu::Buffer,
     /// By name.
-    pub parts: BTreeMap<String, wgpu::Buffer>,
-    pub queues: [wgpu::Buffer; 2],
-    pub counters: wgpu::Buffer,
+    parts: BTreeMap<String, wgpu::Buffer>,
+    queues: [wgpu::Buffer; 2],
+    counters: wgpu::Buffer,
     pub indirect: wgpu::Buffer,
-    pub pixel_sums: wgpu::Buffer,
-    pub guide_sums: wgpu::Buffer,
-    pub group_sums: wgpu::Buffer,
-    /// Counters, then sums, then guides, then groups.
-    pub staging: wgpu::Buffer,
+    pub records: wgpu::Buffer,
 }
 
-/// As many lanes as take no more memory than the largest array that the device can bind, with `state_bytes` for the state of one.
-pub fn most_lanes(gpu: &GpuDevice, state_bytes: u64) -> usize {
-    let largest = state_bytes.max(SUMS_BYTES + GUIDE_BYTES + GROUP_BYTES + COUNTERS_BYTES);
+/// As many lanes as there may be where one has `parts` of these bytes.
+pub fn most_lanes(gpu: &GpuDevice, parts: &BTreeMap<String, u64>) -> usize {
+    let largest = parts.values().copied().max().unwrap_or(0).max(1);
     let bindable = gpu
         .limits
         .max_storage_buffer_binding_size
         .min(gpu.limits.max_buffer_size)
         / largest;
+    let held = MOST_STATE_BYTES / (parts.values().sum::<u64>() + QUEUES_BYTES);
     let dispatchable =
         u64::from(gpu.limits.max_compute_workgroups_per_dimension) * u64::from(WORKGROUP);
-    bindable.min(dispatchable) as usize
+    bindable.min(held).min(dispatchable) as usize
 }
 
 impl Lanes {
@@ -126,12 +155,9 @@ impl Lanes {
         gpu: &GpuDevice,
         capacity: usize,
         parts: &BTreeMap<String, u64>,
-        beside: Beside,
     ) -> Result<Self, GpuError> {
         use wgpu::BufferUsages as Usage;
         let count = capacity as u64;
-        let guides = if beside.guides { count } else { 1 };
-        let groups = if beside.groups { count } else { 1 };
         let make = |label, size, usage| {
             gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -141,31 +167,25 @@ impl Lanes {
             })
         };
         let filled = Usage::STORAGE | Usage::COPY_DST;
-        let both = filled | Usage::COPY_SRC;
         let queue = || make("queue", 4 * count, Usage::STORAGE);
         gpu.catching(|| Self {
             capacity,
-            beside,
-            batch: make(
-                "batch",
-                size_of::<Batch>() as u64,
-                Usage::UNIFORM | Usage::COPY_DST,
-            ),
-            work: make("work", WORK_BYTES * count, filled),
+            batches: make("batches", BATCH_BYTES * (MOST_BATCHES as u64 + 1), filled),
             parts: parts
                 .iter()
                 .map(|(name, bytes)| (name.clone(), make(name, bytes * count, Usage::STORAGE)))
                 .collect(),
             queues: [queue(), queue()],
-            counters: make("counters", COUNTERS_BYTES, both),
-            indirect: make("indirect", 12, Usage::STORAGE | Usage::INDIRECT),
-            pixel_sums: make("pixel sums", SUMS_BYTES * count, both),
-            guide_sums: make("guide sums", GUIDE_BYTES * guides, both),
-            group_sums: make("group sums", GROUP_BYTES * groups, both),
-            staging: make(
-                "staging",
-                COUNTERS_BYTES + SUMS_BYTES * count + GUIDE_BYTES * guides + GROUP_BYTES * groups,
-                Usage::MAP_READ | Usage::COPY_DST,
+            counters: make("counters", COUNTERS_BYTES, filled),
+            indirect: make(
+                "indirect",
+                4 * u64::from(INDIRECT_WORDS),
+                Usage::STORAGE | Usage::INDIRECT,
+            ),
+            records: make(
+                "records",
+                records_bytes(MOST_BATCHES),
+                filled | Usage::COPY_SRC,
             ),
         })
         .map_err(|error| GpuError::Limit {
@@ -180,123 +200,41 @@ impl Lanes {
     /// The buffer of that name in `shaders/gpu/lanes.wgsl` or `shaders/cpu/state.wgsl`; `parity` says which queue is read.
     pub fn get(&self, name: &str, parity: usize) -> Option<&wgpu::Buffer> {
         Some(match name {
-            "batch" => &self.batch,
-            "work" => &self.work,
+            "batches" => &self.batches,
             "queue_in" => &self.queues[parity],
             "queue_out" => &self.queues[1 - parity],
             "counters" => &self.counters,
             "indirect" => &self.indirect,
-            "pixel_sums" => &self.pixel_sums,
-            "guide_sums" => &self.guide_sums,
-            "group_sums" => &self.group_sums,
+            "records" => &self.records,
             part => return self.parts.get(part),
         })
     }
 
-    /// Sends which samples are taken of which pixels.
-    pub fn upload_work(&self, gpu: &GpuDevice, work: &[PixelWork]) {
-        gpu.write(&self.work, 0, bytemuck::cast_slice(work));
-    }
-
-    /// Sends the sums of these pixels.
-    pub fn upload_sums(&self, gpu: &GpuDevice, film: &Film, work: &[PixelWork]) {
-        fn send<T: NoUninit>(gpu: &GpuDevice, to: &wgpu::Buffer, all: &[T], work: &[PixelWork]) {
-            let of_pixel = |work: &PixelWork| all.get(work.pixel as usize).copied();
-            let some: Vec<T> = work.iter().filter_map(of_pixel).collect();
-            gpu.write(to, 0, bytemuck::cast_slice(&some));
-        }
-        send(gpu, &self.pixel_sums, &film.pixels, work);
-        send(gpu, &self.guide_sums, &film.guides, work);
-        send(gpu, &self.group_sums, &film.groups, work);
-    }
-
-    /// Sets the sums of the first `pixels` slots to 0.
-    pub fn clear_sums(&self, encoder: &mut wgpu::CommandEncoder, pixels: usize) {
-        let parts = [&self.pixel_sums, &self.guide_sums, &self.group_sums];
-        for (buffer, bytes) in parts.into_iter().zip(self.sums_bytes(pixels)) {
-            if bytes > 0 {
-                encoder.clear_buffer(buffer, 0, Some(bytes));
-            }
-        }
-    }
-
-    pub fn clear_counters(&self, encoder: &mut wgpu::CommandEncoder) {
+    /// Sends what is to be done next: at most [`MOST_BATCHES`] batches.
+    pub fn begin(&self, gpu: &GpuDevice, batches: &[Batch], encoder: &mut wgpu::CommandEncoder) {
+        let all: Vec<Batch> = (batches.iter().copied())
+            .chain(std::iter::once(Batch::default()))
+            .collect();
+        gpu.write(&self.batches, 0, bytemuck::cast_slice(&all));
         encoder.clear_buffer(&self.counters, 0, None);
+        encoder.clear_buffer(&self.records, 0, Some(size_of::<RecordsHead>() as u64));
     }
+}
 
-    pub fn copy_counters(&self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.copy_buffer_to_buffer(&self.counters, 0, &self.staging, 0, COUNTERS_BYTES);
-    }
+/// Of the shader's `records`, those of so many batches and what comes before them.
+pub const fn records_bytes(batches: usize) -> u64 {
+    (size_of::<RecordsHead>() + batches * size_of::<BatchRecord>()) as u64
+}
 
-    pub fn copy_sums(&self, encoder: &mut wgpu::CommandEncoder, pixels: usize) {
-        let parts = [&self.pixel_sums, &self.guide_sums, &self.group_sums];
-        let mut to = COUNTERS_BYTES;
-        for (buffer, bytes) in parts.into_iter().zip(self.sums_bytes(pixels)) {
-            if bytes > 0 {
-                encoder.copy_buffer_to_buffer(buffer, 0, &self.staging, to, bytes);
-            }
-            to += bytes;
-        }
-    }
-
-    /// Of sums, guides and groups.
-    fn sums_bytes(&self, pixels: usize) -> [u64; 3] {
-        let Beside { guides, groups } = self.beside;
-        let counts = [1, u64::from(guides), u64::from(groups)];
-        let bytes = [SUMS_BYTES, GUIDE_BYTES, GROUP_BYTES];
-        std::array::from_fn(|part| counts[part] * bytes[part] * pixels as u64)
-    }
-
-    /// # Errors
-    /// [`GpuError::Lost`].
-    pub fn read_counters(&self, gpu: &GpuDevice) -> Result<Counters, GpuError> {
-        let bytes = gpu.read(&self.staging, COUNTERS_BYTES)?;
-        Ok(bytemuck::pod_read_unaligned(&bytes))
-    }
-
-    /// Waits for what [`Lanes::copy_counters`] and [`Lanes::copy_sums`] copied.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
-    pub fn wait_for_sums(&self, gpu: &GpuDevice, pixels: usize) -> Result<(), GpuError> {
-        gpu.map(&self.staging, self.read_bytes(pixels))
-    }
-
-    /// After [`Lanes::wait_for_sums`]: puts the sums of these pixels into the film.
-    ///
-    /// # Errors
-    /// [`GpuError::Lost`].
-    pub fn read_sums(
-        &self,
-        gpu: &GpuDevice,
-        film: &mut Film,
-        work: &[PixelWork],
-    ) -> Result<Counters, GpuError> {
-        fn put<T: AnyBitPattern>(all: &mut [T], work: &[PixelWork], bytes: &[u8]) {
-            for (work, bytes) in work.iter().zip(bytes.chunks_exact(size_of::<T>())) {
-                all[work.pixel as usize] = bytemuck::pod_read_unaligned(bytes);
-            }
-        }
-        let [sums, guides, _] = self.sums_bytes(work.len());
-        gpu.take_mapped(&self.staging, self.read_bytes(work.len()), |bytes| {
-            let (counters, rest) = bytes.split_at(COUNTERS_BYTES as usize);
-            let (sums, rest) = rest.split_at(sums as usize);
-            let (guides, groups) = rest.split_at(guides as usize);
-            for (work, sums) in work.iter().zip(sums.chunks_exact(size_of::<PixelSums>())) {
-                // The device does not know the factor where it began with cleared sums.
-                let kept = &mut film.pixels[work.pixel as usize];
-                *kept = PixelSums {
-                    sample_factor: kept.sample_factor,
-                    ..bytemuck::pod_read_unaligned(sums)
-                };
-            }
-            put(&mut film.guides, work, guides);
-            put(&mut film.groups, work, groups);
-            bytemuck::pod_read_unaligned(counters)
-        })
-    }
-
-    fn read_bytes(&self, pixels: usize) -> u64 {
-        COUNTERS_BYTES + self.sums_bytes(pixels).iter().sum::<u64>()
-    }
+/// The head of the shader's `records`, and the records that it counts, of which `known` are left out.
+pub fn read_records(bytes: &[u8], known: usize) -> (RecordsHead, Vec<BatchRecord>) {
+    let (head, records) = bytes.split_at(size_of::<RecordsHead>());
+    let head: RecordsHead = bytemuck::pod_read_unaligned(head);
+    let records = records
+        .chunks_exact(size_of::<BatchRecord>())
+        .take(head.closed as usize)
+        .skip(known)
+        .map(bytemuck::pod_read_unaligned)
+        .collect();
+    (head, records)
 }

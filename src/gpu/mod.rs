@@ -6,13 +6,17 @@
 
 pub mod buffers;
 pub mod compose;
+mod course;
 pub mod device;
 pub mod harness;
 pub mod kernel;
 mod lanes;
 mod pacer;
 mod photons;
+mod portion;
 mod profile;
+mod recording;
+mod slots;
 mod traffic;
 pub mod wavefront;
 

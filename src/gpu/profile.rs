@@ -4,26 +4,31 @@ use serde::Serialize;
 
 use super::{GpuDevice, GpuError};
 
-/// Kernels of the wavefront, in the order of [`KernelSeconds`].
-pub const KERNELS: [&str; 6] = [
+/// Kernels of the wavefront.
+pub const KERNELS: [&str; 8] = [
+    "kernel_begin",
     "kernel_generate",
     "kernel_turn",
     "kernel_trace",
     "kernel_advance",
-    "kernel_accumulate",
+    "kernel_end",
     "kernel_share",
+    "kernel_accumulate",
 ];
-pub const GENERATE: usize = 0;
-pub const TURN: usize = 1;
-pub const TRACE: usize = 2;
-pub const ADVANCE: usize = 3;
-pub const ACCUMULATE: usize = 4;
-pub const SHARE: usize = 5;
+pub const BEGIN: usize = 0;
+pub const GENERATE: usize = 1;
+pub const TURN: usize = 2;
+pub const TRACE: usize = 3;
+pub const ADVANCE: usize = 4;
+pub const END: usize = 5;
+pub const SHARE: usize = 6;
+pub const ACCUMULATE: usize = 7;
 
 /// Seconds on the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct KernelSeconds {
     pub generate: f64,
+    /// What one thread does between the others: queues turned, batches begun and ended.
     pub turn: f64,
     pub trace: f64,
     pub advance: f64,
@@ -35,11 +40,11 @@ impl KernelSeconds {
     fn add(&mut self, kernel: usize, secs: f64) {
         let field = match kernel {
             GENERATE => &mut self.generate,
-            TURN => &mut self.turn,
             TRACE => &mut self.trace,
             ADVANCE => &mut self.advance,
             ACCUMULATE => &mut self.accumulate,
-            _ => &mut self.share,
+            SHARE => &mut self.share,
+            _ => &mut self.turn,
         };
         *field += secs;
     }

@@ -12,6 +12,10 @@ pub struct Traffic {
     pub submissions: u64,
     /// Of the estimator's kernels.
     pub dispatches: u64,
+    /// Of batches of samples, as recorded.
+    pub steps: u64,
+    /// Steps in which no sample was alive any more.
+    pub idle_steps: u64,
     /// How often the host waited for the device.
     pub waits: u64,
 }
@@ -25,6 +29,8 @@ impl std::ops::Sub for Traffic {
             bytes_down: self.bytes_down - before.bytes_down,
             submissions: self.submissions - before.submissions,
             dispatches: self.dispatches - before.dispatches,
+            steps: self.steps - before.steps,
+            idle_steps: self.idle_steps - before.idle_steps,
             waits: self.waits - before.waits,
         }
     }
@@ -37,6 +43,8 @@ pub(super) struct TrafficCounter {
     pub bytes_down: AtomicU64,
     pub submissions: AtomicU64,
     pub dispatches: AtomicU64,
+    pub steps: AtomicU64,
+    pub idle_steps: AtomicU64,
     pub waits: AtomicU64,
 }
 
@@ -48,6 +56,8 @@ impl TrafficCounter {
             bytes_down: of(&self.bytes_down),
             submissions: of(&self.submissions),
             dispatches: of(&self.dispatches),
+            steps: of(&self.steps),
+            idle_steps: of(&self.idle_steps),
             waits: of(&self.waits),
         }
     }

@@ -122,7 +122,7 @@ impl PackedScene {
     }
 
     /// The same where objects were moved: the tree is refitted, which every ray takes as it takes a new one, but more slowly the farther they have
-    /// come.
+    /// come. Where that is far, it is built anew, but in a draft.
     ///
     /// # Errors
     /// As [`PackedScene::build`].
@@ -130,7 +130,8 @@ impl PackedScene {
         self.place_virtual(scene)?;
         let first = self.frame.real_triangle_count;
         let corners = self.corners(first as usize);
-        if !self.virtual_bvh.refit(&corners)? {
+        let is_draft = self.object_covers.is_some();
+        if !self.virtual_bvh.refit(&corners)? || (!is_draft && self.virtual_bvh.is_worn()) {
             self.virtual_bvh = WorldBvh::build(&corners, first)?;
         }
         self.rebuild_moving(scene)

@@ -69,12 +69,11 @@ impl Core {
 
     /// Packs the virtual world anew after an object was moved.
     pub fn pack_moved(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
-        if !self.options.draft {
-            return self.pack_virtual(watcher);
-        }
+        let meter = Meter::begin(watcher, Phase::Trees, 1);
         let begun = self.places.begin();
         self.packed.move_virtual(&self.scene)?;
         self.places.end(Place::Trees, begun);
+        meter.end();
         Ok(())
     }
 

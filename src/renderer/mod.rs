@@ -87,6 +87,8 @@ pub struct RendererOptions {
     /// For a first look: [`Renderer::backdrop_share`], which only tells, is not estimated; albedo from the photograph follows from
     /// the light that was found first, and bounds are looser.
     pub draft: bool,
+    /// A window is drawn on the device that renders, which is left to it more often.
+    pub beside_window: bool,
 }
 
 impl RendererOptions {

@@ -73,6 +73,11 @@ impl Renderer {
         let meter = Meter::begin(watcher, Phase::Kernels, 1);
         let (backend, note) = Backend::open(choice, &core.packed, core.options.without)?;
         core.backend = backend;
+        if let Some(gpu) = core.backend.gpu_mut()
+            && core.options.beside_window
+        {
+            gpu.make_way_for_window();
+        }
         core.notes.extend(note);
         core.seconds.compile += stopwatch.secs();
         meter.end();

@@ -38,7 +38,9 @@ const fn budget(
 const EVERYTHING: Budget = budget("", 256, 96, 5632, 4);
 
 /// Of variants whose trees are shallow. More registers than these leave room for fewer waves.
-const BUDGETS: [Budget; 7] = [
+const BUDGETS: [Budget; 9] = [
+    budget("kernel_begin", 64, 0, 0, 16),
+    budget("kernel_end", 16, 0, 0, 16),
     budget("kernel_generate", 96, 0, 512, 10),
     budget("kernel_turn", 16, 0, 0, 16),
     budget("kernel_trace", 96, 0, 5632, 10),

@@ -498,3 +498,102 @@ fn a_refitted_tree_meets_what_a_new_one_meets() {
         "another number"
     );
 }
+
+/// Half of the triangles go far off, and come back. Control: a little way, which leaves the tree as good as it was.
+#[test]
+fn a_tree_is_worn_once_its_triangles_are_far_from_where_it_was_built() {
+    let before = soup(2000, 0.2, 5);
+    let by = |way: f32| {
+        let mut after = before.clone();
+        for triangle in after.iter_mut().step_by(2) {
+            *triangle = triangle.map(|v| v + way * Vec3::new(1.0, 0.5, 0.2));
+        }
+        after
+    };
+    let mut world = WorldBvh::build(&before, 7).expect("builds");
+    assert!(!world.is_worn());
+    for (way, worn) in [(1e-3, false), (0.5, true), (1e-3, false)] {
+        assert!(world.refit(&by(way)).expect("finite"));
+        assert_eq!(world.is_worn(), worn, "{way} m");
+    }
+}
+
+/// The triangles below a node of the GPU's tree lie in the box that it gives them, decompressed as the shader does; how many there are.
+fn held(nodes: &[[[u32; 4]; 5]], leaves: &[[f32; 4]], node: usize) -> Result<usize, String> {
+    let word = |at: usize| nodes[node][at / 4][at % 4];
+    let byte = |at: usize| (word(at / 4) >> (8 * (at % 4))) & 255;
+    let corner = [0, 1, 2].map(|axis| f64::from(f32::from_bits(word(axis))));
+    let cell = [0, 1, 2].map(|axis| (f64::from(byte(12 + axis)) - 127.0).exp2());
+    let inner = byte(15);
+    let mut count = 0;
+    for slot in 0..8 {
+        let meta = byte(24 + slot);
+        let low = [0, 1, 2]
+            .map(|axis| corner[axis] + cell[axis] * f64::from(byte(32 + 16 * axis + slot)));
+        let high = [0, 1, 2]
+            .map(|axis| corner[axis] + cell[axis] * f64::from(byte(40 + 16 * axis + slot)));
+        let below: Vec<usize> = if meta == 0 {
+            Vec::new()
+        } else if inner >> slot & 1 == 1 {
+            let child = word(4) as usize + (inner & ((1 << slot) - 1)).count_ones() as usize;
+            count += held(nodes, leaves, child)?;
+            triangles_below(nodes, child)
+        } else {
+            let first = (word(5) + (meta & 31)) as usize;
+            let own: Vec<usize> = (first..first + (meta >> 5).count_ones() as usize).collect();
+            count += own.len();
+            own
+        };
+        for corner in below
+            .iter()
+            .flat_map(|&triangle| &leaves[3 * triangle..3 * triangle + 3])
+        {
+            for axis in 0..3 {
+                let x = f64::from(corner[axis]);
+                if x < low[axis] || x > high[axis] {
+                    return Err(format!("{x} outside {} to {}", low[axis], high[axis]));
+                }
+            }
+        }
+    }
+    Ok(count)
+}
+
+fn triangles_below(nodes: &[[[u32; 4]; 5]], node: usize) -> Vec<usize> {
+    let word = |at: usize| nodes[node][at / 4][at % 4];
+    let byte = |at: usize| (word(at / 4) >> (8 * (at % 4))) & 255;
+    let inner = byte(15);
+    let mut all = Vec::new();
+    for slot in (0..8).filter(|&slot| byte(24 + slot) != 0) {
+        let meta = byte(24 + slot);
+        if inner >> slot & 1 == 1 {
+            let child = word(4) as usize + (inner & ((1 << slot) - 1)).count_ones() as usize;
+            all.extend(triangles_below(nodes, child));
+        } else {
+            let first = (word(5) + (meta & 31)) as usize;
+            all.extend(first..first + (meta >> 5).count_ones() as usize);
+        }
+    }
+    all
+}
+
+/// A device's tree that is there is refitted where it lies, beside what moves too. Control: the boxes of before.
+#[test]
+fn a_refitted_tree_of_a_device_holds_its_triangles() {
+    let before = soup(2000, 0.2, 5);
+    let after = moved(&before, Vec3::new(0.3, -0.2, 0.1));
+    let moving = soup(50, 0.3, 6);
+    let mut world = WorldBvh::build(&before, 7).expect("builds");
+    let whole = |world: &WorldBvh| (world.gpu_nodes().concat(), world.gpu_leaves().concat());
+    let (old_nodes, old_leaves) = whole(&world);
+    assert_eq!(held(&old_nodes, &old_leaves, 0), Ok(2000));
+    assert!(world.refit(&after).expect("finite"));
+    let (nodes, leaves) = whole(&world);
+    assert_eq!(held(&nodes, &leaves, 0), Ok(2000));
+    assert_eq!(nodes.len(), old_nodes.len(), "refitted where it lies");
+    assert!(held(&old_nodes, &leaves, 0).is_err(), "control");
+    world.set_moving(&moving).expect("builds");
+    assert!(world.refit(&before).expect("finite"));
+    let (nodes, leaves) = whole(&world);
+    assert_eq!(held(&nodes, &leaves, 0), Ok(2050));
+}

@@ -4,7 +4,7 @@ pub(crate) mod layout;
 mod traffic;
 mod twins;
 mod variants;
-mod wavefront;
+pub(in crate::gpu) mod wavefront;
 
 /// A toy's hash; its WGSL twin is [`MIX`].
 pub(super) fn mix(mut x: u32) -> u32 {

@@ -64,7 +64,8 @@ fn kernels_bind_what_they_use_and_no_more() {
     assert_eq!(turn, set(&["counters", "indirect"]));
     let accumulate: BTreeSet<String> = set(&[
         "frame",
-        "batch",
+        "batches",
+        "counters",
         "group_sums",
         "guide_sums",
         "path_first_hits",

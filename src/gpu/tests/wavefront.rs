@@ -90,7 +90,7 @@ fn toy_sample(seed: u32, pixel: u32, index: u32, real_pass: bool) -> (Sample, u6
 }
 
 /// Twin of [`GpuBackend::render`]; returns the mixed rays.
-fn toy_render(seed: u32, film: &mut Film, work: &WorkList) -> u64 {
+pub(in crate::gpu) fn toy_render(seed: u32, film: &mut Film, work: &WorkList) -> u64 {
     let mut total = 0;
     let real_pass = work.pass == Pass::Real;
     for w in &work.pixels {
@@ -119,10 +119,10 @@ fn toy_render(seed: u32, film: &mut Film, work: &WorkList) -> u64 {
     total
 }
 
-const WIDTH: u32 = 90;
-const HEIGHT: u32 = 70;
+pub(in crate::gpu) const WIDTH: u32 = 90;
+pub(in crate::gpu) const HEIGHT: u32 = 70;
 
-fn toy_backend(gpu: &Arc<GpuDevice>, seed: u32) -> GpuBackend {
+pub(in crate::gpu) fn toy_backend(gpu: &Arc<GpuDevice>, seed: u32) -> GpuBackend {
     let frame = Frame {
         seed,
         exposure_scale: 1.0,
@@ -138,7 +138,7 @@ fn toy_backend(gpu: &Arc<GpuDevice>, seed: u32) -> GpuBackend {
 }
 
 /// The next samples of every other pixel up to `end`, some pixels lagging behind.
-fn work_to(film: &Film, end: u32) -> WorkList {
+pub(in crate::gpu) fn work_to(film: &Film, end: u32) -> WorkList {
     let pixels = (0..WIDTH * HEIGHT)
         .filter(|pixel| pixel % 2 == 0)
         .map(|pixel| {
@@ -246,9 +246,9 @@ fn after_a_loss_another_backend_goes_on_with_whole_pixels() {
     let own = Arc::new(GpuDevice::open(AdapterChoice::Any).expect("opens twice"));
     let mut film = Film::new(WIDTH, HEIGHT, 0, true);
     let mut backend = toy_backend(&own, 5);
-    backend.lose_device_after(2);
+    backend.lose_device_after(1);
     let mut rays = RayCounts::default();
-    // Two batches of the least size, then the loss.
+    // A batch of the least size, then the loss.
     let work = work_to(&film, 8);
     let error = backend
         .render(&mut film, &work, &mut rays, &Watcher::none())

@@ -57,6 +57,7 @@ pub(super) fn take_up(
         real_everywhere: has_real,
         filter: (level == Level::Coarse).then_some(Filter::Preview),
         draft: level == Level::Coarse,
+        beside_window: true,
         without: match level {
             // Caustics come with the whole picture.
             Level::Coarse => [Skip::Photons, Skip::Guide].into_iter().collect(),
