@@ -10,8 +10,15 @@ import package::cpu::state::{
 };
 
 fn draw(st: ptr<function, PathState>, purpose: u32) -> SampleSet {
+    return draw_one_of(st, purpose, 0u, 1u);
+}
+
+fn draw_one_of(st: ptr<function, PathState>, purpose: u32, number: u32, count: u32) -> SampleSet {
     let set_id = FIRST_DEPTH_SET + (*st).ray.depth * SETS_PER_DEPTH + purpose;
-    return sample_set(sample_key(st), set_id);
+    var key = sample_key(st);
+    key.index = key.index * count + number;
+    key.total *= count;
+    return sample_set(key, set_id);
 }
 
 fn sample_key(st: ptr<function, PathState>) -> SampleKey {

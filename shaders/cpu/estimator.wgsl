@@ -15,7 +15,7 @@ import package::camera::sampler::sample_4d;
 import package::camera::shutter::{camera_pose, camera_pose_at, shutter_share};
 import package::cpu::state::{
     COINCIDENCE, DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_FROM_LENS, EVENT_FROM_SHARED, EVENT_PASSED, EVENT_SCATTERED, FAR, FirstHit, Hits, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE,
-    PENDING_BEHIND_PANE, PENDING_NEXT, PENDING_REAL, PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED,
+    PENDING_BEHIND_PANE, PENDING_LIGHT, PENDING_NEXT, PENDING_REAL, PENDING_SHADOW, PENDING_VERTEX, PathState, REQUEST_CLOSEST_EACH, REQUEST_CLOSEST_MIXED,
     REQUEST_CLOSEST_REAL, REQUEST_CLOSEST_VIRTUAL, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_PAIR,
     REQUEST_VIRTUAL_THEN_REAL, RealPath, STAGE_DIFFERENCE_BSDF, STAGE_DIFFERENCE_CONE, STAGE_DIFFERENCE_SHADOW, STAGE_DONE,
     STAGE_PAPER_BEHIND, STAGE_PATH, STAGE_PATH_SHADOW, STAGE_PRIMARY_REAL, STAGE_PRIMARY_VIRTUAL, STAGE_REAL_PASS, Segment,
@@ -187,6 +187,11 @@ fn resume(st: ptr<function, PathState>) {
             (*st).path.pending &= ~PENDING_SHADOW;
             (*st).path.stage = select(STAGE_PATH_SHADOW, STAGE_DIFFERENCE_SHADOW, (*st).path.mode == MODE_DIFFERENCE);
             return;
+        }
+        if (*st).path.pending >= PENDING_LIGHT {
+            (*st).ray.direction = path_reals[lane].segment.direction;
+            plan_vertex(st, path_reals[lane].hit);
+            continue;
         }
         if ((*st).path.pending & PENDING_NEXT) != 0u {
             (*st).path.pending &= ~PENDING_NEXT;

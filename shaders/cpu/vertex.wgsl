@@ -12,7 +12,7 @@ import package::camera::sampler::{SampleSet, fourth, pair, second_pair, third};
 import package::light::backdrop::backdrop_radiance;
 import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres};
 import package::cpu::contribution::{
-    accumulate, density_weight, draw, events_after, from_lens_after, left_to_photons, sees_backdrop, vertex_left_to_photons,
+    accumulate, density_weight, draw, draw_one_of, events_after, from_lens_after, left_to_photons, sees_backdrop, vertex_left_to_photons,
 };
 import package::light::environment::share_left_to_eye;
 import package::light::guide::{GUIDE_SHARE, guide_cell, guide_count, guide_pdf, guide_sample};
@@ -25,9 +25,9 @@ import package::light::lights::{LightSample, light_pdf_hit, light_sample, light_
 import package::math::{dot3, safe_sqrt};
 import package::cpu::state::{
     COINCIDENCE, DELTA_DENSITY, DifferenceRay, EVENT_AT_POLISHED, EVENT_FROM_LENS, EVENT_FROM_SHARED, EVENT_GUIDED, EVENT_LIGHT_LEFT_TO_PATH,
-    EVENT_PASSED, EVENT_SCATTERED, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_NEXT,
+    EVENT_PASSED, EVENT_SCATTERED, FAR, MODE_DIFFERENCE, MODE_MIXED, MODE_REAL, MODE_SHARED, PENDING_DIFFERENCE, PENDING_LIGHT, PENDING_NEXT,
     PENDING_SHADOW, PathState, REQUEST_CLOSEST_EACH, REQUEST_REAL_UNLESS_COVERED, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED,
-    REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL, RayOrigin, Segment, path_differences, path_nexts,
+    REQUEST_SHADOW_PAIR, REQUEST_SHADOW_REAL, RayOrigin, Segment, path_differences, path_nexts, path_reals,
 };
 import package::material::surface::Surface;
 
@@ -35,6 +35,7 @@ import package::material::surface::Surface;
 struct Techniques {
     cone_probability: f32,
     bsdf_probability: f32,
+    lights: u32,
 }
 
 fn max_element(v: vec3<f32>) -> f32 {
@@ -55,11 +56,13 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     let difference = is_difference(st);
     let wo = -(*st).ray.direction;
     let distance = (*st).vertex_hit.t;
-    @if(transmission) {
-        (*st).path.throughput *= transmittance((*st).path.medium, distance);
-    }
-    if !difference {
-        add_emission(st, s);
+    if (*st).path.pending < PENDING_LIGHT {
+        @if(transmission) {
+            (*st).path.throughput *= transmittance((*st).path.medium, distance);
+        }
+        if !difference {
+            add_emission(st, s);
+        }
     }
     let past_last = (*st).ray.depth > frame.max_bounces;
     if (past_last && (frame.flags & FRAME_PANES) == 0u) || (s.flags & EMITS_ONLY) != 0u || all((*st).path.throughput == vec3<f32>(0.0)) {
@@ -82,15 +85,15 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
         if difference && bsdf_is_polished(s) { (*st).path.events |= EVENT_AT_POLISHED; }
     }
     // Those of a path are played for certain.
-    var techniques = Techniques(0.0, 1.0);
+    var techniques = Techniques(0.0, 1.0, 1u);
     @if(!paper) {
         if difference {
             techniques = techniques_at(st, s, wo);
         }
     }
     @if(sharing) { keep_first_vertex(st, s, techniques.cone_probability, techniques.bsdf_probability); }
-    next_event(st, s, wo, techniques);
-    if lights_suffice(st, s) { return; }
+    draw_lights(st, s, wo, techniques);
+    if (*st).path.pending >= PENDING_LIGHT || lights_suffice(st, s) { return; }
     @if(!paper) {
         if difference { plan_cone(st, s, wo, techniques); }
     }
@@ -126,7 +129,7 @@ fn left_to_cones(s: Surface) -> bool {
 }
 
 fn techniques_at(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>) -> Techniques {
-    if (frame.flags & FRAME_NO_CONES) != 0u { return Techniques(0.0, 1.0); }
+    if (frame.flags & FRAME_NO_CONES) != 0u { return Techniques(0.0, 1.0, 1u); }
     let strength = max_element(abs((*st).path.throughput * bsdf_albedo(s, wo)));
     let reach = cone_solid_angle_fraction(cones_at(s.position, s.ns));
     var cone_probability = 0.0;
@@ -135,7 +138,8 @@ fn techniques_at(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>) -> Tec
     if bsdf_is_lambertian(s) {
         bsdf_probability = clamp(RECURSION_ROULETTE_GAIN * strength, RECURSION_ROULETTE_FLOOR, 1.0);
     }
-    return Techniques(cone_probability, bsdf_probability);
+    let in_contact = (*st).ray.depth == 1u && reach >= CONTACT_REACH;
+    return Techniques(cone_probability, bsdf_probability, select(1u, CONTACT_LIGHTS, in_contact));
 }
 
 fn coincides(st: ptr<function, PathState>, s: Surface, distance: f32) -> bool {
@@ -164,11 +168,29 @@ fn add_emission(st: ptr<function, PathState>, s: Surface) {
     accumulate(st, (*st).path.throughput * s.emission * weight);
 }
 
-fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques) {
+fn draw_lights(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques) {
+    let count = techniques.lights;
+    var left = (*st).path.pending / PENDING_LIGHT;
+    (*st).path.pending %= PENDING_LIGHT;
+    if left == 0u { left = count; }
+    while left > 0u && ((*st).path.pending & PENDING_SHADOW) == 0u {
+        next_event(st, s, wo, techniques, count - left, count);
+        left -= 1u;
+    }
+    if left > 0u {
+        (*st).path.pending |= left * PENDING_LIGHT;
+        path_reals[(*st).lane].segment.direction = -wo;
+        path_reals[(*st).lane].hit = (*st).vertex_hit;
+    }
+}
+
+fn next_event(
+    st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques, number: u32, count: u32,
+) {
     if frame.light_count == 0u || bsdf_is_delta(s) { return; }
     let difference = is_difference(st);
     let set_id = select(SET_PATH_LIGHT, SET_DIFFERENCE_LIGHT, difference);
-    let u = draw(st, set_id);
+    let u = draw_one_of(st, set_id, number, count);
     var index = 0u;
     if frame.light_count > 1u {
         let choice_coin = second_pair(u);
@@ -180,7 +202,7 @@ fn next_event(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, technique
             l.radiance = backdrop_radiance(s.position, l.direction);
         }
     }
-    var contribution = light_contribution(st, s, wo, techniques, l);
+    var contribution = light_contribution(st, s, wo, techniques, l) * (1.0 / f32(count));
     @if(photons) {
         if vertex_left_to_photons(st, s) { contribution *= light_left_to_eye(index, l.direction); }
     }

@@ -26,8 +26,23 @@ shared! {
 /// directions and points on lights are found by.
 #[inline]
 pub fn draw(scene: &PackedScene, st: &PathState, purpose: u32) -> SampleSet {
+    draw_one_of(scene, st, purpose, 0, 1)
+}
+
+/// As [`draw`], for the decision's number `number` of `count`: all of a pixel's samples are spread together.
+#[inline]
+pub fn draw_one_of(
+    scene: &PackedScene,
+    st: &PathState,
+    purpose: u32,
+    number: u32,
+    count: u32,
+) -> SampleSet {
     let set_id = FIRST_DEPTH_SET + st.ray.depth * SETS_PER_DEPTH + purpose;
-    sample_set(sample_key(scene, st), set_id)
+    let mut key = sample_key(scene, st);
+    key.index = key.index * count + number;
+    key.total *= count;
+    sample_set(key, set_id)
 }
 
 pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {

@@ -250,6 +250,11 @@ fn resume(scene: &PackedScene, st: &mut PathState) {
             };
             return;
         }
+        if st.path.pending >= PENDING_LIGHT {
+            st.ray.direction = st.real.segment.direction;
+            plan_vertex(st, st.real.hit);
+            continue;
+        }
         if st.path.pending & PENDING_NEXT != 0 {
             st.path.pending &= !PENDING_NEXT;
             follow(st, st.next);

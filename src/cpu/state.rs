@@ -76,6 +76,9 @@ shared! {
     pub const PENDING_BEHIND_PANE: u32 = 32;
     /// A vertex to be shaded: `vertex_hit`, reached along the ray. Never left pending while a ray is traced.
     pub const PENDING_VERTEX: u32 = 16;
+    /// From this bit on, how many more lights are to be drawn at the present vertex. It is shaded again for each, and stands in
+    /// [`PathState::real`] with the direction that it was reached along.
+    pub const PENDING_LIGHT: u32 = 64;
 
     /// The path has scattered other than by a mirror or a smooth interface: what it finds is clamped.
     pub const EVENT_SCATTERED: u32 = 1;

@@ -45,6 +45,11 @@ shared! {
     pub const SHADOW_SHORTEN: f32 = 2e-5;
     pub const SHADOW_SHORTEN_ERRORS: f32 = 4.0;
 
+    /// Lights drawn at the first vertex of a difference where the cones cover this share of what is above it: the noise of contact shadows is theirs,
+    /// and shadow rays cost little beside the rest of a sample.
+    const CONTACT_LIGHTS: u32 = 4;
+    const CONTACT_REACH: f32 = 0.25;
+
     /// A density below it is none.
     const MIN_POSITIVE: f32 = f32::MIN_POSITIVE;
 
@@ -58,6 +63,8 @@ struct Techniques {
     /// With what probability (b) and (c) are played.
     cone_probability: f32,
     bsdf_probability: f32,
+    /// How many are drawn.
+    lights: u32,
 }
 
 fn is_difference(st: &PathState) -> bool {
@@ -70,9 +77,11 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     let difference = is_difference(st);
     let wo = -st.ray.direction;
     let distance = st.vertex_hit.t;
-    st.path.throughput *= transmittance(scene, st.path.medium, distance);
-    if !difference {
-        add_emission(scene, st, s);
+    if st.path.pending < PENDING_LIGHT {
+        st.path.throughput *= transmittance(scene, st.path.medium, distance);
+        if !difference {
+            add_emission(scene, st, s);
+        }
     }
     let past_last = st.ray.depth > scene.frame.max_bounces;
     if past_last && scene.frame.flags & FRAME_PANES == 0
@@ -102,8 +111,8 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
         .as_ref()
         .map_or((0.0, 1.0), |t| (t.cone_probability, t.bsdf_probability));
     keep_first_vertex(scene, st, s, cones, bsdf);
-    next_event(scene, st, s, wo, techniques.as_ref());
-    if lights_suffice(scene, st, s) {
+    draw_lights(scene, st, s, wo, techniques.as_ref());
+    if st.path.pending >= PENDING_LIGHT || lights_suffice(scene, st, s) {
         return;
     }
     if let Some(techniques) = &techniques {
@@ -155,6 +164,7 @@ fn techniques_at(scene: &PackedScene, st: &PathState, s: &Surface, wo: Vec3) -> 
             cones: Cones::default(),
             cone_probability: 0.0,
             bsdf_probability: 1.0,
+            lights: 1,
         };
     }
     let cones = cones_at(&scene.frame, s.position, s.ns);
@@ -171,10 +181,12 @@ fn techniques_at(scene: &PackedScene, st: &PathState, s: &Surface, wo: Vec3) -> 
         bsdf_probability =
             (RECURSION_ROULETTE_GAIN * strength).clamp(RECURSION_ROULETTE_FLOOR, 1.0);
     }
+    let in_contact = st.ray.depth == 1 && reach >= CONTACT_REACH;
     Techniques {
         cones,
         cone_probability,
         bsdf_probability,
+        lights: if in_contact { CONTACT_LIGHTS } else { 1 },
     }
 }
 
@@ -209,7 +221,32 @@ fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     accumulate(scene, st, light);
 }
 
-/// Draws a light and plans its shadow ray. At a difference vertex the technique competes with the cones (at their effective density) and, unless
+/// Draws the vertex's lights up to the next that asks for a shadow ray. Those that are left stay pending: the vertex is shaded again after it.
+fn draw_lights(
+    scene: &PackedScene,
+    st: &mut PathState,
+    s: &Surface,
+    wo: Vec3,
+    techniques: Option<&Techniques>,
+) {
+    let count = techniques.map_or(1, |t| t.lights);
+    let mut left = st.path.pending / PENDING_LIGHT;
+    st.path.pending %= PENDING_LIGHT;
+    if left == 0 {
+        left = count;
+    }
+    while left > 0 && st.path.pending & PENDING_SHADOW == 0 {
+        next_event(scene, st, s, wo, techniques, count - left, count);
+        left -= 1;
+    }
+    if left > 0 {
+        st.path.pending |= left * PENDING_LIGHT;
+        st.real.segment.direction = -wo;
+        st.real.hit = st.vertex_hit;
+    }
+}
+
+/// Draws the light with this number of `count` and plans its shadow ray. At a difference vertex the technique competes with the cones (at their effective density) and, unless
 /// the surface is Lambertian, with the BSDF.
 fn next_event(
     scene: &PackedScene,
@@ -217,6 +254,8 @@ fn next_event(
     s: &Surface,
     wo: Vec3,
     techniques: Option<&Techniques>,
+    number: u32,
+    count: u32,
 ) {
     if scene.frame.light_count == 0 || bsdf_is_delta(s) {
         return;
@@ -227,7 +266,7 @@ fn next_event(
     } else {
         SET_PATH_LIGHT
     };
-    let u = draw(scene, st, set);
+    let u = draw_one_of(scene, st, set, number, count);
     let mut index = 0;
     if scene.frame.light_count > 1 {
         let [choice, coin] = u.second_pair();
@@ -246,7 +285,8 @@ fn next_event(
     {
         l.radiance = backdrop_radiance(scene, s.position, l.direction);
     }
-    let mut contribution = light_contribution(scene, st, s, wo, techniques, &l);
+    let mut contribution =
+        light_contribution(scene, st, s, wo, techniques, &l) * (1.0 / count as f32);
     if vertex_left_to_photons(scene, st, s) {
         contribution *= light_left_to_eye(scene, index, l.direction);
     }

@@ -5,6 +5,7 @@ mod backdrop;
 mod emitters;
 mod estimators;
 mod extremes;
+mod first_lights;
 mod form_factor;
 mod furnace;
 mod lens;

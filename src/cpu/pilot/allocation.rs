@@ -18,6 +18,8 @@ const LARGEST_FACTOR: f32 = 16.0;
 const NEAR_BLOCKS: usize = 1;
 const WIDE_BLOCKS: usize = 5;
 const WIDE_WEIGHT: f32 = 8.0;
+/// Standard error that a real pixel shall have at the most, linear: about ten codes of a mid grey.
+const VISIBLE_ERROR: f32 = 0.04;
 /// What geometry tells is believed this far: at least this times the importance is evaluated.
 const IMPORTANCE_SHARE: f32 = 0.25;
 
@@ -86,6 +88,21 @@ impl Expected {
         }
     }
 
+    /// Speckles show over a photograph: where the error of the difference after that many rays would, it is evaluated more often, `share` of what would
+    /// end that.
+    fn with_visible(&self, rates: Rates, rays: f32, share: f32) -> Rates {
+        let rate = share * self.difference.error / (rays * VISIBLE_ERROR * VISIBLE_ERROR);
+        Rates {
+            difference: rates.difference.max(rate.min(LARGEST_FACTOR)),
+            ..rates
+        }
+    }
+
+    fn samples(&self, rates: Rates) -> f32 {
+        let near = rates.difference.max(rates.mixed);
+        (1.0 - self.near_share) * rates.difference + self.near_share * near
+    }
+
     /// Small lamps that are seen in smooth objects raise the rate where they are, and lower it nowhere: they take few pixels. `even` is the gain that
     /// takes one sample a ray, all in all.
     fn with_highlight(&self, rates: Rates, even: f32) -> Rates {
@@ -104,12 +121,14 @@ impl Expected {
     }
 }
 
-/// The rates of each block: the wanted error at least cost, but not more samples in all than one a ray, highlights apart.
+/// The rates of each block for `rays` per pixel: the wanted error at least cost, and no error of a difference that shows, but not more samples in all than
+/// one a ray, highlights apart.
 pub fn allocate(
     blocks: &Blocks,
     measured: &[BlockMoments],
     importance: &[f32],
     highlights: &[f32],
+    rays: u32,
 ) -> Vec<Rates> {
     let difference: Vec<Moments> = measured.iter().map(|m| m.difference).collect();
     let mixed: Vec<Moments> = measured.iter().map(|m| m.mixed).collect();
@@ -144,26 +163,35 @@ pub fn allocate(
                 e.difference.error / rates.difference,
                 e.mixed.error / rates.mixed,
             );
-            let near = rates.difference.max(rates.mixed);
-            samples += (1.0 - e.near_share) * rates.difference + e.near_share * near;
+            samples += e.samples(rates);
         }
         error <= ERROR_SHARE * error_of_one || samples >= expected.len() as f32
     };
-    let gain = least_gain(is_enough);
+    let gain = least(1e-6, 1e9, is_enough);
     let root = |e: &Expected| {
         let error = e.mean(e.difference.error, e.mixed.error);
         (error / e.mean(e.difference.cost, e.mixed.cost)).sqrt()
     };
     let roots: f32 = expected.iter().map(root).sum();
     let even = gain.max(expected.len() as f32 / roots.max(f32::MIN_POSITIVE));
+    let visible = |e: &Expected, share| e.with_visible(e.rates(gain), rays as f32, share);
+    let too_many = |share| {
+        let samples: f32 = expected.iter().map(|e| e.samples(visible(e, share))).sum();
+        samples >= expected.len() as f32
+    };
+    let share = if too_many(1.0) {
+        least(1e-6, 1.0, too_many)
+    } else {
+        1.0
+    };
     (expected.iter())
-        .map(|e| e.with_highlight(e.rates(gain), even))
+        .map(|e| e.with_highlight(visible(e, share), even))
         .collect()
 }
 
-/// Smallest gain that is enough, within a thousandth: rates and their effect rise with it.
-fn least_gain(is_enough: impl Fn(f32) -> bool) -> f32 {
-    let (mut low, mut high) = (1e-6_f32, 1e9_f32);
+/// Smallest number between two that is enough, within a thousandth: rates and their effect rise with it.
+fn least(low: f32, high: f32, is_enough: impl Fn(f32) -> bool) -> f32 {
+    let (mut low, mut high) = (low, high);
     while high > low * 1.001 {
         let middle = (low * high).sqrt();
         if is_enough(middle) {

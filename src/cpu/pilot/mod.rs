@@ -86,7 +86,13 @@ pub fn pilot(scene: &mut PackedScene, grid: Option<&LensGrid>, meter: &Meter<'_>
             .collect()
     } else {
         let (measured, highlights) = measure(scene, &blocks, &flags, meter);
-        allocate(&blocks, &measured, &importances, &highlights)
+        allocate(
+            &blocks,
+            &measured,
+            &importances,
+            &highlights,
+            scene.frame.rays_total,
+        )
     };
     scene.pixels = (0..flags.len())
         .map(|pixel| rates[blocks.of_pixel(pixel)].pixel(flags[pixel]))

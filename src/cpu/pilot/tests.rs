@@ -8,6 +8,8 @@ use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
 /// Blocks of a picture in vertical bands, each of one squared error, wide enough that most blocks have equals for neighbours.
 const COLUMNS_PER_BAND: usize = 24;
 const ROWS: usize = 24;
+/// After so many rays no error shows.
+const MANY_RAYS: u32 = 1 << 20;
 
 fn bands(errors: &[f32], costs: &[f32]) -> (Blocks, Vec<BlockMoments>) {
     let columns = COLUMNS_PER_BAND * errors.len();
@@ -32,7 +34,8 @@ fn bands(errors: &[f32], costs: &[f32]) -> (Blocks, Vec<BlockMoments>) {
 /// Of equal importance everywhere, without highlights.
 fn allocate_evenly(blocks: &Blocks, moments: &[BlockMoments], importance: f32) -> Vec<Rates> {
     let everywhere = |value| vec![value; blocks.count()];
-    allocate(blocks, moments, &everywhere(importance), &everywhere(0.0))
+    let importance = everywhere(importance);
+    allocate(blocks, moments, &importance, &everywhere(0.0), MANY_RAYS)
 }
 
 /// The rate in the middle of each band.
@@ -143,8 +146,8 @@ fn highlights_raise_the_rate_where_they_are() {
     let mut somewhere = nowhere.clone();
     let lit = ROWS / 2 * 2 * COLUMNS_PER_BAND + COLUMNS_PER_BAND / 2;
     somewhere[lit] = 100.0;
-    let without = allocate(&blocks, &moments, &nowhere, &nowhere);
-    let with = allocate(&blocks, &moments, &nowhere, &somewhere);
+    let without = allocate(&blocks, &moments, &nowhere, &nowhere, MANY_RAYS);
+    let with = allocate(&blocks, &moments, &nowhere, &somewhere, MANY_RAYS);
     for block in 0..blocks.count() {
         if block == lit {
             assert!(with[block].mixed > 4.0 * without[block].mixed);
@@ -153,4 +156,24 @@ fn highlights_raise_the_rate_where_they_are() {
             assert_eq!(with[block], without[block]);
         }
     }
+}
+
+/// An error that would show after the rays asked for is lowered, with no more samples in all than those rays.
+#[test]
+fn what_would_show_is_evaluated_more_often() {
+    // Standard errors of 0.16 and 0.0016 after 25 rays, one a ray.
+    let mut errors = [6.4e-5; 8];
+    errors[0] = 0.64;
+    let (blocks, moments) = bands(&errors, &[4.0; 8]);
+    let nowhere = vec![0.0; blocks.count()];
+    let after = |rays| allocate(&blocks, &moments, &nowhere, &nowhere, rays);
+    let many = middles(&after(MANY_RAYS), 8);
+    assert!(many[0] < 2.0, "control: nothing shows: {many:?}");
+    let some = middles(&after(100), 8);
+    assert!((some[0] - 4.0).abs() < 0.01, "{some:?}");
+    assert_eq!(some[4], many[4], "nothing shows there");
+    let few = after(25);
+    let mean = few.iter().map(|rate| rate.difference).sum::<f32>() / few.len() as f32;
+    assert!((mean - 1.0).abs() < 0.01, "{mean}");
+    assert!(middles(&few, 8)[0] > some[0]);
 }

@@ -12,6 +12,8 @@ const DOC: &str = include_str!("../../../docs/architecture.md");
 const LANE: u32 = 4;
 /// What a first vertex remembers while a point's light is captured.
 const CAPTURE: u32 = 16;
+/// A vertex while lights wait to be drawn there, and the direction that it was reached along.
+const WAITING: u32 = 16 + 12;
 
 /// The largest variants: `direct`, with second vertices shared and without, and `paper`.
 const SHARING: Features = Features {
@@ -87,6 +89,14 @@ fn rows(size: &BTreeMap<String, u32>) -> Vec<String> {
         row(
             "advance to a difference vertex, all techniques played",
             with(0, next + difference),
+        ),
+        row(
+            "advance to a first one, where other lights wait for the shadow ray",
+            with(0, WAITING),
+        ),
+        row(
+            "advance from its shadow ray, which adds light, to the next light",
+            with(result + WAITING, result + WAITING),
         ),
         row(
             "advance from its shadow ray, which adds light, to its cones",
