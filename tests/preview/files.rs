@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use mixray::preview::headless::Window;
+use mixray::preview::headless::{self, Window};
+use mixray::preview::script::parse;
 use mixray::preview::session::Session;
 use mixray::preview::window::App;
 
@@ -107,6 +108,16 @@ fn unsaved_work_survives_a_crash() {
     next.session_mut().save();
     assert!(folder.read("scene.toml").contains("rays_per_pixel = 11"));
     assert!(!written(), "it is saved");
+}
+
+#[test]
+fn a_script_leaves_no_unsaved_work_behind() {
+    let folder = folder();
+    let steps = parse("set rays_per_pixel 2\nmeasure 1\nexpect unsaved\n").unwrap();
+    let scene = folder.path("scene.toml");
+    headless::run(&scene, &steps, FRAME_TIME, &mut |_| ()).unwrap();
+    assert!(!folder.path("scene.toml.unsaved").exists());
+    assert_eq!(folder.read("scene.toml"), SCENE);
 }
 
 #[test]
