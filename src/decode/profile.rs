@@ -157,11 +157,17 @@ impl ColourProfile {
     }
 }
 
-/// What strict readers of ICC.1:2022 ask for and the crate leaves out: a length that is a multiple of four, and D50 to the last bit.
+/// Year, month, day, hour, minute and second of all profiles that are made here.
+const CREATED: [u16; 6] = [2000, 1, 1, 0, 0, 0];
+
+/// What strict readers of ICC.1:2022 ask for and the crate leaves out: a length that is a multiple of four, and D50 to the last bit; and a time
+/// that is not the clock's, so that the same run writes the same bytes.
 fn make_strict(icc: &mut Vec<u8>) -> Option<()> {
     icc.resize(icc.len().next_multiple_of(4), 0);
     let length = u32::try_from(icc.len()).ok()?;
     icc.get_mut(..4)?.copy_from_slice(&length.to_be_bytes());
+    icc.get_mut(24..36)?
+        .copy_from_slice(CREATED.map(u16::to_be_bytes).as_flattened());
     for (place, word) in D50.into_iter().enumerate() {
         let at = 68 + 4 * place;
         icc.get_mut(at..at + 4)?
@@ -243,6 +249,11 @@ mod tests {
         assert!(apart(&again, 9999) < 5e-6, "as RGB");
         assert!(apart(&again, 10099) > 5e-5, "control");
         let p3 = ColourProfile::of_cicp([12, 13, 0, 1]).unwrap();
+        assert_eq!(
+            p3.icc()[24..36],
+            *CREATED.map(u16::to_be_bytes).as_flattened(),
+            "no clock's"
+        );
         assert!(p3.linear([51400, 10280, 10280])[1] < 0.0);
         for hdr in [[12, 16, 0, 1], [9, 18, 0, 1]] {
             assert_eq!(ColourProfile::of_cicp(hdr).unwrap_err(), Unused::IsHdr);
