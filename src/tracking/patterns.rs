@@ -39,6 +39,8 @@ pub struct Likeness {
     pub id: u32,
     /// Quarter turns, clockwise in the picture, from the pattern upright to how it was seen.
     pub turn: usize,
+    /// From -1 to 1.
+    correlation: f64,
     /// By which it is likelier than chance and than the second best.
     pub bits: f64,
     pub is_mirrored: bool,
@@ -161,20 +163,32 @@ impl Patterns {
             |level: &&Level| patch.side_px() * self.share >= LEAST_CELL_PX * level.side as f64;
         let level = self.levels.iter().find(fits).or(self.levels.last())?;
         let seen = patch.means(self.share, level.side);
-        let straight = self.likeness(level, normalised(seen.clone(), level.side)?, false);
-        straight.or_else(|| {
-            let mirrored = reflected(&seen, level.side);
-            self.likeness(level, normalised(mirrored, level.side)?, true)
-        })
+        let mirrored = normalised(reflected(&seen, level.side), level.side)?;
+        let straight = self.likeness(level, &normalised(seen, level.side)?, false);
+        let mirrored = self.likeness(level, &mirrored, true);
+        match (straight, mirrored) {
+            (Some(own), Some(other)) => {
+                let template = &level.templates[other.id as usize];
+                let gain = self.bits(other.correlation, own.correlation, template);
+                // A picture that is much like its own mirror image is taken as it is.
+                if gain > LEAST_BITS {
+                    mirrored
+                } else {
+                    straight
+                }
+            }
+            _ => straight.or(mirrored),
+        }
     }
 
-    fn likeness(&self, level: &Level, seen: Vec<f32>, is_mirrored: bool) -> Option<Likeness> {
-        let ((id, turn), best) = level.second(&seen, (usize::MAX, 0));
-        let (_, second) = level.second(&seen, (id, turn));
-        let bits = self.bits(best, second, &level.templates[id]);
-        (best > LEAST_CORRELATION && bits > LEAST_BITS).then_some(Likeness {
+    fn likeness(&self, level: &Level, seen: &[f32], is_mirrored: bool) -> Option<Likeness> {
+        let ((id, turn), correlation) = level.second(seen, (usize::MAX, 0));
+        let (_, second) = level.second(seen, (id, turn));
+        let bits = self.bits(correlation, second, &level.templates[id]);
+        (correlation > LEAST_CORRELATION && bits > LEAST_BITS).then_some(Likeness {
             id: id as u32,
             turn,
+            correlation,
             bits,
             is_mirrored,
         })

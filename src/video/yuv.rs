@@ -6,6 +6,7 @@
 
 use super::y4m::Header;
 
+#[derive(Clone, Copy)]
 struct Range {
     /// Weights of red and blue in luma.
     red: f64,
@@ -36,14 +37,17 @@ impl Range {
         }
     }
 
-    fn decode(&self, [y, cb, cr]: [u8; 3]) -> [u8; 3] {
-        let luma = (f64::from(y) - self.luma_zero) / self.luma_span;
-        let cb = (f64::from(cb) - 128.0) / self.colour_span;
-        let cr = (f64::from(cr) - 128.0) / self.colour_span;
-        let red = luma + 2.0 * (1.0 - self.red) * cr;
-        let blue = luma + 2.0 * (1.0 - self.blue) * cb;
-        let green = (luma - self.red * red - self.blue * blue) / (1.0 - self.red - self.blue);
-        [red, green, blue].map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8)
+    fn decoder(self) -> Decoder {
+        let colour = |weight: f64, code: f64| {
+            let share = (code - 128.0) / self.colour_span;
+            2.0 * (1.0 - weight) * share
+        };
+        Decoder {
+            luma: table(|code| (code - self.luma_zero) / self.luma_span),
+            red: table(|code| colour(self.red, code)),
+            blue: table(|code| colour(self.blue, code)),
+            range: self,
+        }
     }
 
     /// Unrounded codes.
@@ -60,13 +64,38 @@ impl Range {
     }
 }
 
+/// What each code adds: a frame has far more pixels than there are codes.
+struct Decoder {
+    range: Range,
+    luma: [f64; 256],
+    /// Of Cr to red, and of Cb to blue.
+    red: [f64; 256],
+    blue: [f64; 256],
+}
+
+impl Decoder {
+    fn decode(&self, [y, cb, cr]: [u8; 3]) -> [u8; 3] {
+        let (weight_red, weight_blue) = (self.range.red, self.range.blue);
+        let luma = self.luma[usize::from(y)];
+        let red = luma + self.red[usize::from(cr)];
+        let blue = luma + self.blue[usize::from(cb)];
+        let green =
+            (luma - weight_red * red - weight_blue * blue) / (1.0 - weight_red - weight_blue);
+        [red, green, blue].map(|x| (x.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
+    }
+}
+
+fn table(of: impl Fn(f64) -> f64) -> [f64; 256] {
+    std::array::from_fn(|code| of(code as f64))
+}
+
 fn code(x: f64) -> u8 {
     x.round().clamp(0.0, 255.0) as u8
 }
 
 /// The planes of a frame as encoded RGB, row-major.
 pub fn decode_yuv(header: &Header, planes: &[u8]) -> Vec<[u8; 3]> {
-    let range = Range::of(header);
+    let decoder = Range::of(header).decoder();
     let (width, height) = (header.width as usize, header.height as usize);
     let (block_x, block_y) = header.chroma.block();
     let (chroma_width, chroma_height) = header.chroma_size();
@@ -77,7 +106,7 @@ pub fn decode_yuv(header: &Header, planes: &[u8]) -> Vec<[u8; 3]> {
         let row = y / block_y as usize * chroma_width as usize;
         for x in 0..width {
             let at = row + x / block_x as usize;
-            rgb.push(range.decode([luma[y * width + x], cb[at], cr[at]]));
+            rgb.push(decoder.decode([luma[y * width + x], cb[at], cr[at]]));
         }
     }
     rgb
@@ -146,7 +175,7 @@ mod tests {
         ] {
             let range = Range::of(&header);
             assert_eq!(range.encode(rgb).map(code), yuv);
-            let back = range.decode(yuv);
+            let back = range.decoder().decode(yuv);
             assert!(
                 rgb.iter().zip(back).all(|(a, b)| a.abs_diff(b) <= 1),
                 "{rgb:?} {back:?}"
@@ -172,7 +201,7 @@ mod tests {
         assert_eq!(range.encode([0, 255, 0]).map(code), [173, 42, 26]);
         assert_eq!(range.encode([255; 3]).map(code), [235, 128, 128]);
         for rgb in [[244, 89, 89], [0, 0, 255], [10, 200, 30]] {
-            let back = range.decode(range.encode(rgb).map(code));
+            let back = range.decoder().decode(range.encode(rgb).map(code));
             assert!(
                 rgb.iter().zip(back).all(|(a, b)| a.abs_diff(b) <= 2),
                 "{back:?}"

@@ -144,12 +144,20 @@ fn markers_are_known_by_their_patterns_under_noise_and_blur() {
 }
 
 #[test]
-fn other_patterns_and_what_cannot_be_told_apart_are_refused() {
+fn other_patterns_and_mirrors_are_refused() {
     let folder = prepared();
     let film = Film::around();
-    film.save(&folder, "film.y4m", &print([letter, ring]));
+    let print = print([letter, ring]);
+    film.save(&folder, "film.y4m", &print);
+    film.save(&folder, "mirrored.y4m", &|at| {
+        print(DVec2::new(-at.x, at.y))
+    });
     let others = "--pattern steps.patt --pattern strokes.patt --marker-size 80mm -o poses.json";
     folder.refuse(&format!("track film.y4m {others}"), "no marker is seen");
+    folder.refuse(
+        "track mirrored.y4m --pattern f.patt --pattern ring.patt --marker-size 80mm -o poses.json",
+        "ffmpeg -vf hflip",
+    );
     folder.refuse(
         "track film.y4m --marker-size 80mm -o poses.json",
         "expected black squares",
