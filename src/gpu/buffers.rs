@@ -2,6 +2,7 @@
 
 use bytemuck::Zeroable;
 
+use super::kernel::UNIFORM_USAGE;
 use super::{GpuDevice, GpuError};
 use crate::accel::WorldBvh;
 use crate::packed::{
@@ -120,7 +121,7 @@ impl SceneBuffers {
             frame: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("frame"),
                 size: size_of::<Frame>() as u64,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                usage: UNIFORM_USAGE,
                 mapped_at_creation: false,
             }),
             arrays: arrays

@@ -1,5 +1,6 @@
 //! A compute pipeline made from composed WGSL; its bind group layouts are read off the code itself.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 
 use wgpu::naga;
@@ -60,6 +61,20 @@ pub fn reflect_bindings(wgsl: &str) -> Result<Vec<Binding>, String> {
     Ok(bindings)
 }
 
+/// How buffers of uniforms are used: on software devices they are read as storage (see [`for_device`]).
+pub const UNIFORM_USAGE: wgpu::BufferUsages = wgpu::BufferUsages::UNIFORM
+    .union(wgpu::BufferUsages::STORAGE)
+    .union(wgpu::BufferUsages::COPY_DST);
+
+/// Mesa's software driver compiles a kernel anew, before it is bound, for the values of the uniforms that its branches depend on, and keeps every
+/// copy. From storage it takes values as they come; both address spaces lay structures out alike.
+fn for_device<'a>(gpu: &GpuDevice, wgsl: &'a str) -> Cow<'a, str> {
+    match gpu.info.device_type {
+        wgpu::DeviceType::Cpu => wgsl.replace("var<uniform>", "var<storage, read>").into(),
+        _ => wgsl.into(),
+    }
+}
+
 /// A compiled entry point.
 pub struct Kernel {
     entry_point: String,
@@ -81,6 +96,7 @@ impl Kernel {
             entry_point: entry_point.to_owned(),
             message,
         };
+        let wgsl = &*for_device(gpu, wgsl);
         let bindings = reflect_bindings(wgsl).map_err(shader_error)?;
         let mut names = HashSet::new();
         if let Some(twice) = bindings.iter().find(|b| !names.insert(b.name.as_str())) {

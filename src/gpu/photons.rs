@@ -6,7 +6,7 @@ use std::time::Instant;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::kernel::{BindGroups, Kernel};
+use super::kernel::{BindGroups, Kernel, UNIFORM_USAGE};
 use super::{Composer, Features, GpuDevice, GpuError, SceneBuffers};
 use crate::cpu::photons::path::SEQUENCE_BITS;
 use crate::film::{Film, Splat};
@@ -89,11 +89,7 @@ impl Photons {
         let list = SPLAT_BYTES * u64::from(LARGEST_BATCH);
         let filled = Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC;
         let batch_bytes = size_of::<PhotonBatch>() as u64;
-        let batch = make(
-            "photon batch",
-            batch_bytes,
-            Usage::UNIFORM | Usage::COPY_DST,
-        );
+        let batch = make("photon batch", batch_bytes, UNIFORM_USAGE);
         let counters = make("photon counters", COUNTERS_BYTES, filled);
         let splats = make("splats", list, Usage::STORAGE | Usage::COPY_SRC);
         let read = Usage::MAP_READ | Usage::COPY_DST;

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::STAGES;
-use crate::gpu::kernel::Kernel;
+use crate::gpu::kernel::{Kernel, UNIFORM_USAGE};
 use crate::gpu::{Composer, Features, GpuDevice, GpuError};
 
 /// Threads of a workgroup along each axis.
@@ -92,11 +92,10 @@ impl GpuStages {
     }
 
     pub(super) fn uniform<T: bytemuck::Pod>(&self, params: &T) -> wgpu::Buffer {
-        use wgpu::BufferUsages as Usage;
         let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("params"),
             size: size_of::<T>() as u64,
-            usage: Usage::UNIFORM | Usage::COPY_DST,
+            usage: UNIFORM_USAGE,
             mapped_at_creation: false,
         });
         self.gpu.write(&buffer, 0, bytemuck::bytes_of(params));

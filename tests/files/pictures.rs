@@ -31,10 +31,16 @@ fn render(folder: &Folder) -> String {
 
 /// A picture of one code, with a profile.
 fn with_profile(code: [u8; 3], profile: Option<&ColorProfile>) -> Vec<u8> {
+    with_icc(
+        code,
+        profile.map(|profile| profile.encode().expect("encodes")),
+    )
+}
+
+fn with_icc(code: [u8; 3], icc: Option<Vec<u8>>) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = image::codecs::png::PngEncoder::new(&mut bytes);
-    if let Some(profile) = profile {
-        let icc = profile.encode().expect("encodes");
+    if let Some(icc) = icc {
         encoder.set_icc_profile(icc).expect("is taken");
     }
     let codes = code.repeat(64 * 48);
@@ -52,16 +58,14 @@ fn profile_of(bytes: &[u8]) -> Option<Vec<u8>> {
 #[test]
 fn icc_p3() {
     let folder = folder("p.png", "");
-    let p3 = ColorProfile::new_display_p3();
-    folder.write("p.png", with_profile([200, 40, 40], Some(&p3)));
+    // It holds the time at which it was encoded.
+    let p3 = ColorProfile::new_display_p3().encode().expect("encodes");
+    folder.write("p.png", with_icc([200, 40, 40], Some(p3.clone())));
     let said = render(&folder);
     assert!(!said.contains("profile"), "{said}");
     let out = folder.open("out.png");
     assert_eq!(out.get_pixel(0, 0).0, [200, 40, 40], "codes are kept");
-    assert_eq!(
-        profile_of(&folder.bytes("out.png")),
-        Some(p3.encode().expect("encodes"))
-    );
+    assert_eq!(profile_of(&folder.bytes("out.png")), Some(p3));
     // The ball's own colour is written in the photograph's.
     let ball_p3 = out.get_pixel(32, 24).0;
     folder.write("p.png", with_profile([200, 40, 40], None));
