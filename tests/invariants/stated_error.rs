@@ -6,7 +6,7 @@ use mixray::scene::{BackendChoice, Composite, Scene};
 
 use super::support::*;
 
-const SEEDS: u32 = 16;
+const SEEDS: u32 = 64;
 
 fn defocused() -> Scene {
     let mut scene = scene(&format!(

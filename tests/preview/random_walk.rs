@@ -42,16 +42,20 @@ fn event(window: &mut Window, folder: &Folder, random: &mut Random) {
             window.key(names[below(random, names.len())], held).unwrap();
         }
         70..78 => {
-            let composition = window.session().composition().unwrap();
+            let session = window.session_mut();
             let there: Vec<Quantity> = (Quantity::CHOICES.iter())
                 .map(|(_, quantity)| *quantity)
-                .filter(|quantity| quantity.of(composition).is_some())
+                .filter(|quantity| {
+                    let composition = session.composition();
+                    composition.is_some_and(|composition| quantity.of(composition).is_some())
+                })
                 .collect();
-            let quantity = there[below(random, there.len())];
-            let value = 0.6 + 3.0 * random.uniform();
-            window
-                .session_mut()
-                .edit("set", |composition| quantity.set(composition, value));
+            // None without a scene.
+            if !there.is_empty() {
+                let quantity = there[below(random, there.len())];
+                let value = 0.6 + 3.0 * random.uniform();
+                session.edit("set", |composition| quantity.set(composition, value));
+            }
         }
         78..84 => window.session_mut().undo(),
         84..88 => window.session_mut().redo(),
@@ -94,6 +98,14 @@ fn two_thousand_random_events_leave_a_valid_scene() {
         event(&mut window, &folder, &mut random);
         edits += u32::from(window.session().revision() != revision);
         if n % 100 == 99 {
+            if window.session().composition().is_none() {
+                // The list of files has opened a scene that is none: it is told, and another can be opened.
+                let session = window.session_mut();
+                assert!(session.is_reading() || session.problem().is_some());
+                folder.write("scene.toml", SCENE);
+                session.switch(&folder.path("scene.toml"));
+                window.wait_for_scene().unwrap();
+            }
             let text = window.session().text().unwrap();
             let scene = load_text(&folder.path("scene.toml"), &text);
             let scene = scene.unwrap_or_else(|error| panic!("event {n}: {error}\n{text}"));

@@ -42,6 +42,20 @@ fn one(kernel: usize) -> Dispatch {
     }
 }
 
+/// A dispatch of as many workgroups as the device has written down.
+fn at(kernel: usize, parity: usize, word: u32) -> Dispatch {
+    Dispatch {
+        kernel,
+        parity,
+        workgroups: Workgroups::At(word),
+    }
+}
+
+/// Closes the batch that is done, and opens the next, whose lanes the next step reads; without effect while one is open.
+fn beginning(parity: usize) -> [Dispatch; 2] {
+    [one(BEGIN), at(GENERATE, 1 - parity, FOR_GENERATE)]
+}
+
 /// What a batch is to take: a beginning, steps, and an end. It has no effect on a batch that goes on from an earlier round but its steps and its end.
 struct Round {
     lane_count: f64,
@@ -59,17 +73,8 @@ impl Round {
         parity: &mut usize,
         lane_steps: impl Fn(usize) -> f64,
     ) -> Result<u64, GpuError> {
-        let at = |kernel, parity, word| Dispatch {
-            kernel,
-            parity,
-            workgroups: Workgroups::At(word),
-        };
-        let begin = [
-            one(BEGIN),
-            // The queue that is written is read by the next step.
-            at(GENERATE, 1 - *parity, FOR_GENERATE),
-        ];
-        let mut ended = recording.add(stage, &begin, BEGINNING_STEPS * self.lane_count)?;
+        let lanes = BEGINNING_STEPS * self.lane_count;
+        let mut ended = recording.add(stage, &beginning(*parity), lanes)?;
         for step in 0..self.steps {
             let dispatches = [
                 one(TURN),
@@ -246,8 +251,9 @@ impl GpuBackend {
         let mut records = Vec::new();
         let mut steps_in_vain = 0;
         loop {
-            let begin = [one(BEGIN)];
-            let ended = recording.add(&mut stage, &begin, 0.0)?;
+            // Closes the last batch; if that went on in the place of the next, it opens the next, which has lanes from then on.
+            let close = beginning(self.parity);
+            let ended = recording.add(&mut stage, &close, 0.0)?;
             job.watcher.taken(ended);
             let ended = recording.finish(
                 &mut stage,
@@ -288,7 +294,8 @@ impl GpuBackend {
                     steps,
                     shares,
                 };
-                let lane_steps = |step| match is_open {
+                // None of one that has just begun are counted yet.
+                let lane_steps = |step| match is_open && alive > 0.0 {
                     true => alive / (1.0 + step as f64),
                     false => course.lane_steps(lane_count, step),
                 };

@@ -60,6 +60,18 @@ enum Gesture {
     Wipe,
 }
 
+impl Gesture {
+    /// What is dragged.
+    fn object(&self) -> Option<usize> {
+        match *self {
+            Self::Object { object, .. }
+            | Self::Scale { object, .. }
+            | Self::Gizmo { object, .. } => Some(object),
+            _ => None,
+        }
+    }
+}
+
 pub(super) struct Canvas {
     picture: Option<TextureHandle>,
     photo: Option<TextureHandle>,
@@ -145,6 +157,7 @@ impl Canvas {
         };
         let camera = &loaded.scene.camera;
         self.size = vec2(camera.width as f32, camera.height as f32);
+        self.forget_lost_objects(session);
         self.upload(ui, session);
         self.lay_out(area);
         if area.is_positive() {
@@ -153,6 +166,14 @@ impl Canvas {
             self.lay_out(area);
             self.paint(ui, area, session);
         }
+    }
+
+    /// Objects may be gone since the last frame, by an undo or with another file.
+    fn forget_lost_objects(&mut self, session: &Session) {
+        let count = (session.composition()).map_or(0, |composition| composition.objects.len());
+        self.selected = self.selected.filter(|object| *object < count);
+        self.gesture =
+            (self.gesture).filter(|gesture| gesture.object().is_none_or(|object| object < count));
     }
 
     fn lay_out(&mut self, area: Rect) {
