@@ -81,11 +81,6 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "picks the CPU's tree of a world; the shader's trace has both",
     ),
     (
-        "cpu::request",
-        "answer_past",
-        "two loops on the CPU, of which a scene asks for one; a shader is made for its scene",
-    ),
-    (
         "stages::antialias",
         "source_at blended",
         "a thread reads one pixel; the CPU walks rows",
