@@ -26,6 +26,19 @@ fn course(steps: u32) -> Course {
     course
 }
 
+/// A device whose speed is known, and which takes small batches alone: how they are cut does not depend on the clock.
+fn of_known_speed(gpu: &Arc<GpuDevice>) -> GpuBackend {
+    let mut backend = toy_backend(gpu, 7);
+    backend.warm = true;
+    backend.pacer = Pacer::new(LANES, false);
+    let load = Load {
+        lane_steps: 1e9,
+        dispatches: 3,
+    };
+    backend.pacer.record(Duration::from_millis(1), load);
+    backend
+}
+
 /// Renders with small batches and this course, and holds the film to the twin; returns what went to the device and back, and how many batches it took.
 fn rendered(backend: &mut GpuBackend, course: Course) -> (Traffic, usize) {
     backend.courses[0] = course;
@@ -50,15 +63,7 @@ fn rendered(backend: &mut GpuBackend, course: Course) -> (Traffic, usize) {
 #[test]
 fn batches_longer_than_was_learnt_go_on_in_the_place_of_the_next() {
     let Some(gpu) = test_device() else { return };
-    let mut backend = toy_backend(gpu, 7);
-    // A device whose speed is known, and which takes small batches alone: how they are cut does not depend on the clock.
-    backend.warm = true;
-    backend.pacer = Pacer::new(LANES, false);
-    let load = Load {
-        lane_steps: 1e9,
-        dispatches: 3,
-    };
-    backend.pacer.record(Duration::from_millis(1), load);
+    let mut backend = of_known_speed(gpu);
     let (short, batches) = rendered(&mut backend, course(1));
     assert!(batches > 3, "{batches}");
     let (known, _) = rendered(&mut backend, course(150));
@@ -83,14 +88,7 @@ fn batches_longer_than_was_learnt_go_on_in_the_place_of_the_next() {
 #[test]
 fn batches_end_in_any_round() {
     let Some(gpu) = test_device() else { return };
-    let mut backend = toy_backend(gpu, 7);
-    backend.warm = true;
-    backend.pacer = Pacer::new(LANES, false);
-    let load = Load {
-        lane_steps: 1e9,
-        dispatches: 3,
-    };
-    backend.pacer.record(Duration::from_millis(1), load);
+    let mut backend = of_known_speed(gpu);
     for steps in 18..60 {
         rendered(&mut backend, course(steps));
     }
