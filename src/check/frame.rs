@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{Finding, Metres};
 use crate::scene::check::Check;
-use crate::scene::placing::foot;
+use crate::scene::placing::Foot;
 use crate::scene::projection::{project, undistort};
 use crate::scene::ray::{HalfLine, nearest};
 use crate::scene::{Camera, Object, Scene, Side};
@@ -18,19 +18,20 @@ const VERTICES: usize = 4096;
 /// Widths of the sensors of cameras, millimetres: telephones to large format.
 const SENSORS_MM: std::ops::RangeInclusive<f64> = 2.5..=130.0;
 
-pub(super) fn findings(scene: &Scene) -> Vec<Finding> {
+/// `feet`: of the scene's objects in order, where they are asked for.
+pub(super) fn findings(scene: &Scene, feet: &[Option<Foot>]) -> Vec<Finding> {
     let camera = &scene.camera;
     let position = camera.world_from_camera.w_axis.truncate();
     let mut findings = Vec::new();
-    for (index, object) in scene.objects.iter().enumerate() {
+    for (index, (object, foot)) in scene.objects.iter().zip(feet).enumerate() {
         let is_inside = match object.side {
             Side::Real => is_within(scene, index, position),
             Side::Virtual => is_in_boxes(object, position),
         };
         if is_inside {
             findings.push(inside(object));
-        } else if object.side == Side::Virtual && !object.is_animated() {
-            let of_size = size(camera, position, object);
+        } else if let Some(foot) = foot {
+            let of_size = size(camera, position, object, foot);
             findings.extend(of_size.or_else(|| out_of_frame(camera, object)));
         }
     }
@@ -87,9 +88,8 @@ fn is_within(scene: &Scene, index: usize, point: DVec3) -> bool {
             })
 }
 
-fn size(camera: &Camera, position: DVec3, object: &Object) -> Option<Finding> {
+fn size(camera: &Camera, position: DVec3, object: &Object, foot: &Foot) -> Option<Finding> {
     let name = &object.name;
-    let foot = foot(&object.instances, object.world_from_object)?;
     let origin = object.world_from_object.w_axis.truncate();
     let distance_m = (foot.point - position)
         .length()

@@ -10,7 +10,8 @@ use std::fmt;
 
 use crate::distortion::LENS_FISHEYE;
 use crate::scene::check::Check;
-use crate::scene::{Choice, Exposure, Scene};
+use crate::scene::placing::{Foot, foot};
+use crate::scene::{Choice, Exposure, Object, Scene, Side};
 
 /// Stops by which "auto" would change the exposure, above which it is told.
 const LARGE_EV: f64 = 1.0;
@@ -53,13 +54,20 @@ pub enum Extent {
 
 /// All findings that the scene does not allow, without the exposure, which asks for rays: [`exposure`].
 pub fn scene(scene: &Scene, extent: Extent) -> Vec<Finding> {
+    let feet: Vec<Option<Foot>> = scene.objects.iter().map(foot_of).collect();
     let mut findings = lights::findings(scene);
-    findings.extend(standing::findings(scene));
+    findings.extend(standing::findings(scene, &feet));
     if extent == Extent::Still {
-        findings.extend(frame::findings(scene));
+        findings.extend(frame::findings(scene, &feet));
     }
     findings.retain(|finding| !scene.allowed.contains(&finding.check));
     findings
+}
+
+/// Of a virtual object that does not move.
+fn foot_of(object: &Object) -> Option<Foot> {
+    let stands = object.side == Side::Virtual && !object.is_animated();
+    stands.then(|| foot(&object.instances, object.world_from_object))?
 }
 
 /// That the light does not fit the photograph; `fitted_ev` is what "auto" would take.

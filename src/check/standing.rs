@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{Finding, Metres};
 use crate::scene::check::Check;
-use crate::scene::placing::{Foot, foot};
+use crate::scene::placing::Foot;
 use crate::scene::{Object, Scene, Side};
 
 /// Share of its size that an object may hang above its support or reach below it.
@@ -17,18 +17,16 @@ const PROBES: usize = 3;
 /// Share of an object's width that the places are apart.
 const PROBE_SPREAD: f64 = 0.25;
 
-pub(super) fn findings(scene: &Scene) -> Vec<Finding> {
+/// `feet`: of the scene's objects in order, where they are asked for.
+pub(super) fn findings(scene: &Scene, feet: &[Option<Foot>]) -> Vec<Finding> {
     let has_proxy = scene.objects.iter().any(|o| o.side == Side::Real);
     if !has_proxy {
         return Vec::new();
     }
-    let objects = scene.objects.iter();
-    let standing: Vec<(&Object, Foot)> = objects
-        .filter(|object| object.side == Side::Virtual && !object.is_animated())
-        .filter_map(|object| {
-            let foot = foot(&object.instances, object.world_from_object)?;
-            (foot.size_m > 0.0).then_some((object, foot))
-        })
+    let objects = scene.objects.iter().zip(feet);
+    let standing: Vec<(&Object, &Foot)> = objects
+        .filter_map(|(object, foot)| Some((object, foot.as_ref()?)))
+        .filter(|(_, foot)| foot.size_m > 0.0)
         .collect();
     let mut probes: Vec<Probe> = Vec::new();
     for (index, (object, foot)) in standing.iter().enumerate() {
@@ -55,7 +53,7 @@ pub(super) fn findings(scene: &Scene) -> Vec<Finding> {
     let findings = of_object.into_iter();
     let findings = findings.filter_map(|(index, probes)| {
         let (object, foot) = standing[index];
-        finding(object, &foot, &probes)
+        finding(object, foot, &probes)
     });
     findings.collect()
 }
@@ -123,14 +121,16 @@ fn drop_onto(objects: &[Object], probes: &mut [Probe]) {
             if !(xs().any(|x| x <= last_x) && xs().any(|x| x >= first_x)) {
                 continue;
             }
+            let positions = &instance.primitive.positions;
+            let at = |p: &[f32; 3]| transform.transform_point3(DVec3::from(p.map(f64::from)));
+            let xs: Vec<f64> = positions.iter().map(|p| at(p).x).collect();
             for triangle in &instance.primitive.triangles {
-                let corners = triangle.map(|vertex| {
-                    let position = instance.primitive.positions[vertex as usize];
-                    transform.transform_point3(DVec3::from(position.map(f64::from)))
-                });
-                let xs = corners.map(|corner| corner.x);
-                let least = xs.into_iter().fold(f64::INFINITY, f64::min);
-                let most = xs.into_iter().fold(f64::NEG_INFINITY, f64::max);
+                let [a, b, c] = triangle.map(|vertex| xs[vertex as usize]);
+                let (least, most) = (a.min(b).min(c), a.max(b).max(c));
+                if most < first_x || least > last_x {
+                    continue;
+                }
+                let corners = triangle.map(|vertex| at(&positions[vertex as usize]));
                 let start = probes.partition_point(|probe| probe.x < least);
                 for probe in &mut probes[start..] {
                     if probe.x > most {

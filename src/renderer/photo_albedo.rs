@@ -17,16 +17,28 @@ use crate::packed::{
 use crate::scene::Photo;
 use crate::work::{Meter, Phase, Watcher};
 
+/// How many rays are traced where.
+#[derive(Clone, Copy)]
+struct GridSpec {
+    pitch_px: usize,
+    /// Per grid point.
+    rays: u32,
+}
+
 /// Largest albedo: above it paths would hardly end, and no diffuse surface is whiter.
 const MAX_ALBEDO: f32 = 0.98;
 /// Albedo of the first round.
 const FIRST_ALBEDO: f32 = 0.5;
-/// Grid pitch of the irradiance estimate in pixels, and its rays per grid point.
-const GRID_PITCH_PX: usize = 4;
-const GRID_RAYS: u32 = 32;
+/// Grid of the irradiance estimate.
+const GRID: GridSpec = GridSpec {
+    pitch_px: 4,
+    rays: 32,
+};
 const ROUNDS: usize = 2;
-/// Grid pitch of an exposure that is only told.
+/// Least grid pitch of an exposure that is only told, its grid points at the most, and its rays per grid point.
 const ROUGH_PITCH_PX: usize = 24;
+const ROUGH_POINTS: usize = 200;
+const ROUGH_RAYS: u32 = 8;
 /// Half-width of the spreading filter in grid points; relative depth and normal tolerances.
 const FILTER_RADIUS: isize = 3;
 const DEPTH_TOLERANCE: f32 = 0.02;
@@ -78,7 +90,7 @@ pub fn estimate_photo_albedo(
         seen,
         light: Vec::new(),
     };
-    let points = grid_points(scene, GRID_PITCH_PX);
+    let points = grid_points(scene, GRID.pitch_px);
     let meter = Meter::begin(watcher, Phase::Albedo, ROUNDS as u64 * points);
     let mut limited = 0;
     for _ in 0..ROUNDS {
@@ -158,25 +170,31 @@ pub fn fit_exposure_ev(
     watcher: &Watcher<'_>,
 ) -> Option<f64> {
     let seen = first_surfaces(scene, 1, |_| true);
-    fit_exposure_on(scene, photo, &seen, GRID_PITCH_PX, watcher)
+    fit_exposure_on(scene, photo, &seen, GRID, watcher)
 }
 
 /// [`fit_exposure_ev`] from so few rays that it costs next to nothing.
 pub fn roughly_fit_exposure_ev(scene: &mut PackedScene, photo: &Photo) -> Option<f64> {
-    let seen = first_surfaces(scene, ROUGH_PITCH_PX, |_| true);
-    fit_exposure_on(scene, photo, &seen, ROUGH_PITCH_PX, &Watcher::none())
+    let pixels = scene.frame.width as usize * scene.frame.height as usize;
+    let grid = GridSpec {
+        pitch_px: pixels.div_ceil(ROUGH_POINTS).isqrt().max(ROUGH_PITCH_PX),
+        rays: ROUGH_RAYS,
+    };
+    let seen = first_surfaces(scene, grid.pitch_px, |_| true);
+    fit_exposure_on(scene, photo, &seen, grid, &Watcher::none())
 }
 
 fn fit_exposure_on(
     scene: &mut PackedScene,
     photo: &Photo,
     seen: &[Seen],
-    pitch_px: usize,
+    grid: GridSpec,
     watcher: &Watcher<'_>,
 ) -> Option<f64> {
     scene.photo_albedo = unknown_albedo(scene, seen);
-    let meter = Meter::begin(watcher, Phase::Exposure, grid_points(scene, pitch_px));
-    let grid = trace_grid(scene, seen, pitch_px, &meter);
+    let points = grid_points(scene, grid.pitch_px);
+    let meter = Meter::begin(watcher, Phase::Exposure, points);
+    let grid = trace_grid(scene, seen, grid, &meter);
     meter.end();
     let width = scene.frame.width as usize;
     let mut ratios: Vec<f64> = grid
@@ -275,13 +293,14 @@ fn grid_points(scene: &PackedScene, pitch_px: usize) -> u64 {
 }
 
 /// Path traces the real world on the grid, with a pinhole.
-fn trace_grid(scene: &mut PackedScene, seen: &[Seen], pitch_px: usize, meter: &Meter<'_>) -> Grid {
+fn trace_grid(scene: &mut PackedScene, seen: &[Seen], spec: GridSpec, meter: &Meter<'_>) -> Grid {
+    let GridSpec { pitch_px, rays } = spec;
     let kept = scene.frame;
     scene.frame.aperture_radius = 0.0;
     // Savings left out do not change the estimate, whichever came first.
     scene.frame.flags &= !(FRAME_BOTH_SHADOWS | FRAME_NO_CONES | FRAME_NO_LAST_VERTEX);
     scene.frame.flags |= FRAME_AOVS;
-    scene.frame.rays_total = GRID_RAYS;
+    scene.frame.rays_total = rays;
     scene.frame.estimator = ESTIMATOR_DIRECT;
     let (frame_width, frame_height) = (kept.width as usize, kept.height as usize);
     let (width, height) = grid_size(scene, pitch_px);
@@ -297,12 +316,12 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen], pitch_px: usize, meter: &M
                 return None;
             }
             let (mut radiance, mut albedo) = (Vec3::ZERO, Vec3::ZERO);
-            for index in 0..GRID_RAYS {
+            for index in 0..rays {
                 let (ir, a) = render_first_hit(shared, pixel as u32, index);
                 radiance += ir;
                 albedo += a;
             }
-            let n = GRID_RAYS as f32;
+            let n = rays as f32;
             Some(GridPoint {
                 x,
                 y,
@@ -321,7 +340,7 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen], pitch_px: usize, meter: &M
 
 /// E / pi of every pixel with a wanted surface: the grid's estimates, weighted by distance, depth and normal.
 fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) -> Vec<Vec3> {
-    let grid = trace_grid(scene, seen, GRID_PITCH_PX, meter);
+    let grid = trace_grid(scene, seen, GRID, meter);
     let width = scene.frame.width as usize;
     seen.par_iter()
         .enumerate()
@@ -330,7 +349,7 @@ fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) 
                 return Vec3::ZERO;
             }
             let (x, y) = (pixel % width, pixel / width);
-            let (gx, gy) = ((x / GRID_PITCH_PX) as isize, (y / GRID_PITCH_PX) as isize);
+            let (gx, gy) = ((x / GRID.pitch_px) as isize, (y / GRID.pitch_px) as isize);
             let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
             for dy in -FILTER_RADIUS..=FILTER_RADIUS {
                 for dx in -FILTER_RADIUS..=FILTER_RADIUS {
@@ -344,7 +363,7 @@ fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) 
                     let there = &seen[point.y * width + point.x];
                     let away =
                         (point.x as f32 - x as f32).powi(2) + (point.y as f32 - y as f32).powi(2);
-                    let pitch = GRID_PITCH_PX as f32;
+                    let pitch = GRID.pitch_px as f32;
                     let depth_step = (there.depth_m - s.depth_m)
                         / (s.depth_m * DEPTH_TOLERANCE * (1.0 + away.sqrt() / pitch));
                     let weight = (-away / (2.0 * pitch * pitch)).exp()

@@ -199,15 +199,18 @@ pub fn foot(instances: &[Instance], world_from_object: DMat4) -> Option<Foot> {
     })
 }
 
-/// The vertices in the space that `transform` leads to from the object's.
+/// The triangles' vertices, each once, in the space that `transform` leads to from the object's.
 fn points(instances: &[Instance], transform: DMat4) -> impl Iterator<Item = DVec3> {
     instances.iter().flat_map(move |instance| {
         let transform = transform * instance.object_from_local;
-        let triangles = instance.primitive.triangles.iter().flatten();
-        triangles.map(move |vertex| {
-            let position = instance.primitive.positions[*vertex as usize];
-            transform.transform_point3(DVec3::from(position.map(f64::from)))
-        })
+        let primitive = &instance.primitive;
+        let mut is_used = vec![false; primitive.positions.len()];
+        for vertex in primitive.triangles.iter().flatten() {
+            is_used[*vertex as usize] = true;
+        }
+        let positions = primitive.positions.iter().zip(is_used);
+        let used = positions.filter_map(|(position, is_used)| is_used.then_some(position));
+        used.map(move |p| transform.transform_point3(DVec3::from(p.map(f64::from))))
     })
 }
 
