@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 
 use super::{Finding, Metres};
 use crate::scene::check::Check;
-use crate::scene::placing::Foot;
-use crate::scene::{Object, Scene, Side};
+use crate::scene::placing::{Foot, bounds};
+use crate::scene::{Instance, Object, Scene, Side};
 
 /// Share of its size that an object may hang above its support or reach below it.
 const TOLERANCE: f64 = 0.01;
@@ -106,47 +106,49 @@ struct Probe<'s> {
     support_y: Option<f64>,
 }
 
-/// Finds the highest surface on each way, in one walk over all triangles.
+/// Finds the highest surface on each way, in one walk over the triangles of what some of them meet.
 fn drop_onto(objects: &[Object], probes: &mut [Probe]) {
     probes.sort_by(|a, b| a.x.total_cmp(&b.x));
-    let Some((first, last)) = probes.first().zip(probes.last()) else {
-        return;
-    };
-    let (first_x, last_x) = (first.x, last.x);
     for object in objects {
         for instance in &object.instances {
             let transform = object.world_from_object * instance.object_from_local;
-            let corners = instance.corners();
-            let xs = || corners.iter().map(|c| transform.transform_point3(*c).x);
-            if !(xs().any(|x| x <= last_x) && xs().any(|x| x >= first_x)) {
+            let corners = instance.corners().into_iter();
+            let Some((low, high)) = bounds(corners.map(|c| transform.transform_point3(c))) else {
                 continue;
+            };
+            let mut near: Vec<&mut Probe> = probes
+                .iter_mut()
+                .filter(|probe| !std::ptr::eq(probe.object, object))
+                .filter(|probe| (low.x..=high.x).contains(&probe.x))
+                .filter(|probe| (low.z..=high.z).contains(&probe.z))
+                .collect();
+            if !near.is_empty() {
+                drop_on(instance, transform, &mut near);
             }
-            let positions = &instance.primitive.positions;
-            let at = |p: &[f32; 3]| transform.transform_point3(DVec3::from(p.map(f64::from)));
-            let xs: Vec<f64> = positions.iter().map(|p| at(p).x).collect();
-            for triangle in &instance.primitive.triangles {
-                let [a, b, c] = triangle.map(|vertex| xs[vertex as usize]);
-                let (least, most) = (a.min(b).min(c), a.max(b).max(c));
-                if most < first_x || least > last_x {
-                    continue;
-                }
-                let corners = triangle.map(|vertex| at(&positions[vertex as usize]));
-                let start = probes.partition_point(|probe| probe.x < least);
-                for probe in &mut probes[start..] {
-                    if probe.x > most {
-                        break;
-                    }
-                    if std::ptr::eq(probe.object, object) {
-                        continue;
-                    }
-                    let height = height_at(corners, probe.x, probe.z);
-                    let below = height.filter(|y| *y <= probe.highest_y);
-                    probe.support_y = match (below, probe.support_y) {
-                        (Some(a), Some(b)) => Some(a.max(b)),
-                        (a, b) => a.or(b),
-                    };
-                }
+        }
+    }
+}
+
+/// `probes` are sorted by x.
+fn drop_on(instance: &Instance, world_from_local: DMat4, probes: &mut [&mut Probe]) {
+    let positions = &instance.primitive.positions;
+    let at = |p: &[f32; 3]| world_from_local.transform_point3(DVec3::from(p.map(f64::from)));
+    let xs: Vec<f64> = positions.iter().map(|p| at(p).x).collect();
+    for triangle in &instance.primitive.triangles {
+        let [a, b, c] = triangle.map(|vertex| xs[vertex as usize]);
+        let (least, most) = (a.min(b).min(c), a.max(b).max(c));
+        let start = probes.partition_point(|probe| probe.x < least);
+        for probe in &mut probes[start..] {
+            if probe.x > most {
+                break;
             }
+            let corners = triangle.map(|vertex| at(&positions[vertex as usize]));
+            let height = height_at(corners, probe.x, probe.z);
+            let below = height.filter(|y| *y <= probe.highest_y);
+            probe.support_y = match (below, probe.support_y) {
+                (Some(a), Some(b)) => Some(a.max(b)),
+                (a, b) => a.or(b),
+            };
         }
     }
 }
