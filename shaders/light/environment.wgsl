@@ -54,8 +54,8 @@ fn half_sin(x: f32) -> f32 {
 }
 
 @if(environment_map)
-fn row_solid_angle_above(row: f32, v: f32, height: f32) -> f32 {
-    let edges = row_edges(row, height);
+fn row_solid_angle_above(row: f32, v: f32) -> f32 {
+    let edges = row_edges(row, f32(frame.env_height));
     let above = half_sin(edges.upper + v) * half_sin(v - edges.upper);
     let whole = half_sin(edges.upper + edges.lower) * half_sin(edges.lower - edges.upper);
     return clamp(above / max(whole, 1e-30), 0.0, 1.0);
@@ -78,7 +78,7 @@ fn env_evaluate(direction: vec3<f32>) -> EnvEvaluation {
         if frame.env_width != 0u {
             let c = env_coordinates(direction);
             let n = env_neighbours(c.x, c.y);
-            let above = row_solid_angle_above(n.row, c.y, f32(frame.env_height));
+            let above = row_solid_angle_above(n.row, c.y);
             let interpolated = max(luminance(env_interpolate(n, above)), 0.0);
             return EnvEvaluation(
                 interpolated * frame.env_radiance.w,

@@ -10,7 +10,7 @@ use crate::distortion::{
     Coefficients, LENS_FISHEYE, distort, distortion_area, fisheye_angle_fast, fisheye_direction,
     fisheye_radius, undistort_fast,
 };
-use crate::math::{INV_TAU, atan2_, dot3, normalize3, sincos_2pi};
+use crate::math::{INV_TAU, atan2_, dot3, floor_, normalize3, sincos_2pi};
 use crate::packed::{APERTURE_DISC, APERTURE_SQUARE, Frame};
 use crate::shared::shared;
 
@@ -63,7 +63,7 @@ pub fn sample_lens(frame: &Frame, u: f32, v: f32) -> [f32; 2] {
     }
     // One triangle a blade, from the centre to two corners.
     let blades = frame.aperture_shape as f32;
-    let blade = (u * blades).floor().min(blades - 1.0);
+    let blade = floor_(u * blades).min(blades - 1.0);
     let along = (u * blades - blade).max(0.0).sqrt() * radius;
     let (half_s, half_c) = sincos_2pi(0.5 / blades);
     let x = along * half_c;

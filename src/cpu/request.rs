@@ -122,6 +122,23 @@ pub fn answer(scene: &PackedScene, st: &mut PathState) {
     let request = st.ray.request;
     let alpha = scene.frame.flags & FRAME_ALPHA != 0;
     let panes = scene.frame.flags & FRAME_PANES != 0 && is_shadow(request);
+    // Rays that nothing lets through keep no account of what they have passed.
+    if alpha || panes {
+        answer_past::<true>(scene, st, alpha, panes);
+    } else {
+        answer_past::<false>(scene, st, false, false);
+    }
+}
+
+/// [`answer`], where the ray may go past what it meets (`PAST`): transparent layers (`alpha`) and panes.
+fn answer_past<const PAST: bool>(
+    scene: &PackedScene,
+    st: &mut PathState,
+    alpha: bool,
+    panes: bool,
+) {
+    let request = st.ray.request;
+    let (alpha, panes) = (PAST && alpha, PAST && panes);
     let mut hits = Hits {
         in_real: MISS,
         in_virtual: MISS,

@@ -9,7 +9,7 @@
 use glam::Vec3;
 
 use super::environment_table::{interval_of, starts_count};
-use crate::math::{PI, atan2_, luminance, safe_sqrt, sincos_2pi};
+use crate::math::{PI, atan2_, floor_, luminance, safe_sqrt, sincos_2pi};
 use crate::packed::{Frame, PackedScene};
 use crate::shared::shared;
 
@@ -44,7 +44,7 @@ fn env_coordinates(frame: &Frame, direction: Vec3) -> (f32, f32) {
     let u = 0.5 + atan2_(x, -z) * (0.5 / PI);
     // Not the arc cosine of y: it loses half the digits near the poles.
     let v = atan2_(safe_sqrt(x * x + z * z), direction.y) * (1.0 / PI);
-    (u - u.floor(), v)
+    (u - floor_(u), v)
 }
 
 fn env_texel(scene: &PackedScene, i: u32, j: u32) -> Vec3 {
@@ -56,8 +56,8 @@ fn env_texel(scene: &PackedScene, i: u32, j: u32) -> Vec3 {
     )
 }
 
-/// Upper and lower edge of a row of cells, as v.
-fn row_edges(row: f32, height: f32) -> (f32, f32) {
+/// Upper and lower edge of a row of cells, as v; the CPU looks them up ([`RowEdge`](super::environment_table::RowEdge)).
+pub(super) fn row_edges(row: f32, height: f32) -> (f32, f32) {
     (
         ((row - 0.5) / height).max(0.0),
         ((row + 0.5) / height).min(1.0),
@@ -69,7 +69,7 @@ fn env_neighbours(scene: &PackedScene, u: f32, v: f32) -> Neighbours {
     let height = scene.frame.env_height;
     let s = u * width as f32 - 0.5;
     let t = v * height as f32 - 0.5;
-    let (s0, t0) = (s.floor(), t.floor());
+    let (s0, t0) = (floor_(s), floor_(t));
     let i0 = (s0 as i32 + width as i32) as u32 % width;
     let i1 = (i0 + 1) % width;
     let j0 = (t0.max(0.0) as u32).min(height - 1);
@@ -86,16 +86,15 @@ fn env_neighbours(scene: &PackedScene, u: f32, v: f32) -> Neighbours {
 }
 
 /// Sine of half the angle from the zenith to a row's v.
-fn half_sin(v: f32) -> f32 {
+pub(super) fn half_sin(v: f32) -> f32 {
     sincos_2pi(0.25 * v).0
 }
 
 /// (cos a - cos x) / (cos a - cos b) for the row's edges a and b, as products of sines: differences of cosines cancel near the poles.
-fn row_solid_angle_above(row: f32, v: f32, height: f32) -> f32 {
-    let (upper, lower) = row_edges(row, height);
-    let above = half_sin(upper + v) * half_sin(v - upper);
-    let whole = half_sin(upper + lower) * half_sin(lower - upper);
-    (above / whole.max(1e-30)).clamp(0.0, 1.0)
+fn row_solid_angle_above(scene: &PackedScene, row: f32, v: f32) -> f32 {
+    let upper = scene.env_edges[row as usize];
+    let above = half_sin(upper.v + v) * half_sin(v - upper.v);
+    (above / upper.half_height.max(1e-30)).clamp(0.0, 1.0)
 }
 
 fn env_interpolate(n: &Neighbours, fy: f32) -> Vec3 {
@@ -111,7 +110,7 @@ pub fn env_evaluate(scene: &PackedScene, direction: Vec3) -> (f32, Vec3) {
     }
     let (u, v) = env_coordinates(&scene.frame, direction);
     let n = env_neighbours(scene, u, v);
-    let above = row_solid_angle_above(n.row, v, scene.frame.env_height as f32);
+    let above = row_solid_angle_above(scene, n.row, v);
     let interpolated = luminance(env_interpolate(&n, above)).max(0.0);
     (
         interpolated * scene.frame.env_radiance[3],
@@ -212,12 +211,12 @@ fn env_sample_map(scene: &PackedScene, u0: f32, u1: f32) -> EnvSample {
     );
     let fy = sample_linear(upper_u, l00 + l10, l01 + l11);
     let fx = sample_linear(left_u, l00 + (l01 - l00) * fy, l10 + (l11 - l10) * fy);
-    // Squared sine and cosine of half the angle from the zenith: each is precise at its own pole.
-    let (upper, lower) = row_edges(row as f32, frame.env_height as f32);
-    let (upper_sin, upper_cos) = sincos_2pi(0.25 * upper);
-    let (lower_sin, lower_cos) = sincos_2pi(0.25 * lower);
-    let sin2 = upper_sin * upper_sin * (1.0 - fy) + lower_sin * lower_sin * fy;
-    let cos2 = upper_cos * upper_cos * (1.0 - fy) + lower_cos * lower_cos * fy;
+    let (upper, lower) = (
+        scene.env_edges[row as usize],
+        scene.env_edges[row as usize + 1],
+    );
+    let sin2 = upper.sin2 * (1.0 - fy) + lower.sin2 * fy;
+    let cos2 = upper.cos2 * (1.0 - fy) + lower.cos2 * fy;
     let y = cos2 - sin2;
     let r = 2.0 * safe_sqrt(sin2 * cos2);
     let (sin, cos) = sincos_2pi((column as f32 + 0.5 + fx) / frame.env_width as f32 - 0.5);

@@ -2,7 +2,19 @@
 
 use glam::Vec3;
 
-use crate::math::luminance;
+use super::environment::{half_sin, row_edges};
+use crate::math::{luminance, sincos_2pi};
+
+/// The upper edge of a row of cells, and what follows from it alone. Zenith angles are in units of pi, as v is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowEdge {
+    pub v: f32,
+    /// Squared sine and cosine of half the angle from the zenith: each is precise at its own pole.
+    pub sin2: f32,
+    pub cos2: f32,
+    /// Half the difference of the cosines of the row's edges.
+    pub half_height: f32,
+}
 
 /// Cumulative distributions for sampling a map by brightness.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -12,6 +24,8 @@ pub struct EnvironmentTable {
     pub cdf: Vec<f32>,
     /// Where [`interval_of`] begins to look: [`starts_count`] of the rows entries for the marginal, then as many as the columns have for each row.
     pub starts: Vec<u32>,
+    /// Of each of the height + 1 rows, and the lower one of the last.
+    pub edges: Vec<RowEdge>,
     /// 1 / integral of the cells' mean luminance over the sphere; 0 for a black map.
     pub normaliser: f32,
     /// Mean luminance over the sphere.
@@ -57,6 +71,7 @@ pub fn environment_table(width: u32, height: u32, texels: &[f32]) -> Environment
     EnvironmentTable {
         cdf,
         starts,
+        edges: edges_of_rows(height),
         normaliser: if integral > 0.0 {
             (1.0 / integral) as f32
         } else {
@@ -64,6 +79,22 @@ pub fn environment_table(width: u32, height: u32, texels: &[f32]) -> Environment
         },
         mean_luminance: integral / (4.0 * std::f64::consts::PI),
     }
+}
+
+fn edges_of_rows(height: u32) -> Vec<RowEdge> {
+    (0..height + 2)
+        .map(|row| {
+            let (upper, lower) = row_edges(row as f32, height as f32);
+            let v = upper.min(1.0);
+            let (sin, cos) = sincos_2pi(0.25 * v);
+            RowEdge {
+                v,
+                sin2: sin * sin,
+                cos2: cos * cos,
+                half_height: half_sin(upper + lower) * half_sin(lower - upper),
+            }
+        })
+        .collect()
 }
 
 /// Running sums scaled to end at exactly 1; uniform where all weights are zero.

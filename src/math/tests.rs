@@ -32,6 +32,26 @@ fn assert_within(name: &str, error: f64, limit: f64) {
 }
 
 #[test]
+fn the_floor_is_the_library_s() {
+    let whole = (-5..=5).map(|i| i as f32);
+    let around = whole.flat_map(|x| [x.next_down(), x, x.next_up()]);
+    let far = [
+        -2_147_483_500.0,
+        -16_777_217.0,
+        8_388_607.5,
+        2_147_483_500.0,
+    ];
+    let values: Vec<f32> = around
+        .chain(sweep(-40.0, 40.0, 10_007))
+        .chain(far)
+        .collect();
+    for x in &values {
+        assert_eq!(floor_(*x), x.floor(), "{x}");
+    }
+    assert!(values.iter().any(|x| x.trunc() != x.floor()), "control");
+}
+
+#[test]
 fn sincos_matches_f64() {
     // The range reduction is exact, so the truth may reduce in f64 too.
     let turns = |x: f64| (x - x.floor()) * std::f64::consts::TAU;

@@ -269,6 +269,7 @@ impl PackedScene {
                 );
                 self.env_cdf = table.cdf;
                 self.env_starts = table.starts;
+                self.env_edges = table.edges;
             }
         }
     }

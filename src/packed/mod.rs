@@ -11,6 +11,7 @@ pub use materials::Material;
 pub use records::*;
 
 use crate::accel::{Cover, WorldBvh};
+use crate::light::environment_table::RowEdge;
 pub use crate::shared::NONE;
 
 /// What a backend renders.
@@ -36,6 +37,8 @@ pub struct PackedScene {
     pub env_cdf: Vec<f32>,
     /// `EnvironmentTable::starts`, for the CPU alone.
     pub env_starts: Vec<u32>,
+    /// `EnvironmentTable::edges`, for the CPU alone.
+    pub env_edges: Vec<RowEdge>,
     /// For `albedo = "from-photo"`, empty where unused: albedo of the photograph's pixels and the depth (metres along the axis) it was seen
     /// at, then for each scene object its patches, [`records::PHOTO_PATCHES`] pairs: mean albedo of the pixels that see a part of it and how many
     /// they are; their mean position, metres, and mean squared distance from it.
@@ -112,6 +115,7 @@ impl PackedScene {
             env_texels: Vec::new(),
             env_cdf: Vec::new(),
             env_starts: Vec::new(),
+            env_edges: Vec::new(),
             photo_albedo: Vec::new(),
             guide: Vec::new(),
             facet_tables: Vec::new(),

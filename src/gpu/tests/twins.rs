@@ -39,6 +39,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "films are merged and read on the host",
     ),
     ("camera::lens", "xyz", "WGSL writes v.xyz"),
+    ("math", "floor", "WGSL has it"),
     (
         "distortion",
         "sqrt atan opencv fisheye is_none is_regular newton undistort fisheye_angle",
@@ -79,6 +80,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "cpu::request",
         "trace",
         "picks the CPU's tree of a world; the shader's trace has both",
+    ),
+    (
+        "cpu::request",
+        "answer_past",
+        "two loops on the CPU, of which a scene asks for one; a shader is made for its scene",
     ),
     (
         "stages::antialias",
