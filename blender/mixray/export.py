@@ -79,7 +79,7 @@ def _export_still(context, photograph, *, scene, folder, report, camera):
 
 def _export_film(context, photograph, *, scene, folder, report, camera):
     first, last = scene.frame_start, scene.frame_end
-    names = photograph.prepare_frames(scene, first, last)
+    names = photograph.prepare_frames(first, last)
     fps = scene.render.fps / scene.render.fps_base
     entries, squares, table, lens = [], [], None, None
     for frame, name in names.items():

@@ -91,8 +91,11 @@ class MIXRAY_OT_render(bpy.types.Operator):
 
     def _end(self, context):
         code = self.process.returncode
+        lines = self.log.read_text(errors="replace").strip().splitlines()
+        for line in lines:
+            if line.startswith("warning: "):
+                self.report({"WARNING"}, line.removeprefix("warning: "))
         if code not in (0, 130):
-            lines = self.log.read_text(errors="replace").strip().splitlines()
             self.report({"ERROR"}, f"mixray: {lines[-1] if lines else f'ended with code {code}'}")
             return {"CANCELLED"}
         if self.output.suffix == ".exr":
