@@ -68,7 +68,9 @@ def run_openjd(job, mixray):
 
 def run_slurm(job, mixray):
     subprocess.run(["sh", "submit.sh"], cwd=job, check=True, env={**os.environ, "MIXRAY": mixray})
-    while subprocess.run(["squeue", "--noheader"], capture_output=True, text=True, check=True).stdout.strip():
+    while waiting := subprocess.run(["squeue", "--noheader", "--format=%r"], capture_output=True, text=True, check=True).stdout.split():
+        if "DependencyNeverSatisfied" in waiting:
+            raise SystemExit("Slurm does not begin the last step: it takes a task as failed")
         time.sleep(1)
     return 1
 

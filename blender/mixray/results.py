@@ -14,7 +14,7 @@ def load_picture(scene, path):
     picture = _image_node(tree, bpy.data.images.load(str(path), check_existing=True), "mixray layers", (-600, 0))
     picture.image.reload()
     group = tree.nodes.new("CompositorNodeGroup")
-    group.node_tree, group.label, group.location, group.width = _group(), "mixray composite", (-250, 0), 220
+    group.node_tree, group.label, group.location, group.width = _group(), "mixray composite", (-300, 0), 280
     tree.links.new(picture.outputs["Combined"], group.inputs["Composite"])
     tree.links.new(picture.outputs["mask"], group.inputs["Mask"])
     photograph = _photograph_node(tree, scene)
