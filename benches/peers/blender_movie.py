@@ -4,8 +4,9 @@
     benches/peers/blender_movie.py [--mixray PROGRAM] [--rays N] [-o FOLDER]
 
 Wants `ffmpeg`, and a Python with `bpy`, `numpy` and `OpenEXR`. Cycles renders the frames, ffmpeg makes a movie of them, which becomes the camera's clip.
-Each frame that the extension decodes must be nearest to the frame that went in, and the mask of what is added lie over Cycles' of the same frame; the
-control is the mask of another one. Writes three frames of the film, and them as they were, to film.png. Exit code 1 where a bound is missed.
+Each frame that the extension decodes must be nearest to the frame that went in, and the mask of what is added lie over Cycles' of the same frame; in the
+compositor the scene's frames must show the film's. The controls are other frames. Writes three frames of the film, and them as they were, to film.png.
+Exit code 1 where a bound is missed.
 """
 
 import argparse
@@ -19,10 +20,13 @@ import blender_shots  # first: it finds the extension
 import bpy
 import mixray
 from mixray.export import export_shot
+from mixray.results import Film, load_picture
 
 import blender_scenes
 
 LOOKED_AT = (1, 6, 12)
+# The movie's first frame in the scene: not the number of a file.
+BEGIN = 101
 
 
 def picture(path):
@@ -49,7 +53,16 @@ def movie_of(clip, folder):
         for marker in track.markers:
             same.markers.insert_frame(marker.frame, co=marker.co)
     blender_scenes.solve(movie)
+    movie.frame_start = BEGIN
     return movie
+
+
+def composited(scene, frame, folder):
+    """What the compositor makes of a frame of the scene, linear RGB."""
+    scene.frame_set(frame)
+    scene.render.filepath = str(folder / "composited.exr")
+    bpy.ops.render.render(write_still=True)
+    return blender_shots.rgb(blender_shots.planes(scene.render.filepath))
 
 
 def main():
@@ -72,6 +85,7 @@ def main():
             masks[frame] = cycles.render("mask")
     movie = movie_of(clip, folder)
     scene.camera.constraints[0].clip = scene.camera.data.background_images[0].clip = movie
+    scene.frame_start, scene.frame_end = BEGIN, BEGIN + 11
     scene.mixray.is_sequence = True
     shot = export_shot(bpy.context, folder / "shot")
     print(shot.report.text(), end="")
@@ -86,12 +100,21 @@ def main():
 
     program = blender_shots.Mixray(arguments.mixray, arguments.rays)
     _, *command = shot.command(arguments.mixray, folder / "film")
-    program.run(*command, "--format", "exr", "--layers", "composite,mask", "--rpp", arguments.rays, "--overwrite")
+    program.run(*command, "--rpp", arguments.rays)
     film = {frame: blender_shots.planes(folder / "film" / f"{frame:06}.exr") for frame in LOOKED_AT}
     for frame, other in zip(LOOKED_AT, (*LOOKED_AT[1:], LOOKED_AT[0])):
         right, wrong = (blender_shots.iou(film[at]["mask.Y"], masks[frame]) for at in (frame, other))
         print(f"frame {frame}: mask IoU {right:.4f}, that of frame {other} {wrong:.4f}")
         met &= right > 0.995 > wrong
+
+    load_picture(scene, folder / "film" / "000001.exr", Film(BEGIN, 1, 12))
+    scene.render.image_settings.color_mode = "RGB"
+    for frame in LOOKED_AT:
+        made = composited(scene, BEGIN - 1 + frame, folder)
+        off = {at: np.abs(made - blender_shots.rgb(planes)).max() for at, planes in film.items()}
+        others = min(error for at, error in off.items() if at != frame)
+        print(f"frame {frame} in the compositor: {off[frame]:.2e} off, {others:.2e} from another one")
+        met &= off[frame] < 1e-4 < others
     rows = [np.concatenate([blender_shots.rgb(planes) for planes in film.values()], 1)]
     rows.append((np.concatenate([plates[frame - 1] for frame in LOOKED_AT], 1) / 255.0) ** 2.2)
     blender_shots.write_png(np.concatenate(rows), folder / "film.png")

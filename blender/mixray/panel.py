@@ -14,8 +14,8 @@ class Preferences(bpy.types.AddonPreferences):
     bl_idname = __package__
 
     binary: StringProperty(
-        name="mixray",
-        description="The program; its name alone if it is on the path",
+        name="Program",
+        description="mixray; its name alone if it is on the path",
         subtype="FILE_PATH",
         default="mixray",
     )
@@ -102,6 +102,8 @@ class MIXRAY_PT_lamp(bpy.types.Panel):
         return context.object is not None and context.object.type == "LIGHT"
 
     def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
         self.layout.prop(context.object.mixray, "is_added")
 
 
