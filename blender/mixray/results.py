@@ -73,7 +73,7 @@ def _photograph_node(tree, scene):
     for background in backgrounds:
         if background.source == "MOVIE_CLIP" and background.clip:
             node = tree.nodes.new("CompositorNodeMovieClip")
-            node.clip, node.label, node.location = background.clip, "mixray photograph", (-600, 400)
+            node.clip, node.label, node.location, node.width = background.clip, "mixray photograph", (-600, 400), 240
             return node
         if background.source == "IMAGE" and background.image:
             node = _image_node(tree, background.image, "mixray photograph", (-600, 400))
