@@ -4,6 +4,7 @@
     blender/build.py [FOLDER]
 """
 
+import re
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,8 @@ import zipfile
 from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parent / "mixray"
+# Extensions came with this version.
+OLDEST = (4, 2)
 
 
 def build(folder):
@@ -25,8 +28,8 @@ def build(folder):
 
 
 def validator():
-    """Blender's own command, or the same of the module `bpy`; None without either."""
-    if shutil.which("blender"):
+    """Blender's own command, or the same of the module `bpy`; None without one of either that knows extensions."""
+    if _blender_version() >= OLDEST:
         return ["blender", "--command", "extension", "validate"]
     try:
         import bpy
@@ -36,14 +39,23 @@ def validator():
     return [sys.executable, str(script), "validate"]
 
 
+def _blender_version():
+    """(major, minor) of the `blender` on the path, (0, 0) without one."""
+    if not shutil.which("blender"):
+        return 0, 0
+    said = subprocess.run(["blender", "--version"], capture_output=True, text=True).stdout
+    found = re.search(r"Blender (\d+)\.(\d+)", said)
+    return (int(found[1]), int(found[2])) if found else (0, 0)
+
+
 def main():
     path = build(sys.argv[1] if len(sys.argv) > 1 else ".")
     print(f"written: {path}")
     command = validator()
     if command is None:
-        print("not validated: neither `blender` nor the Python module `bpy` is here")
+        print("not validated: neither `blender` nor the Python module `bpy` is here, of {}.{} or newer".format(*OLDEST))
         return
-    subprocess.run([*command, str(path)], check=True)
+    sys.exit(subprocess.run([*command, str(path)]).returncode)
 
 
 if __name__ == "__main__":

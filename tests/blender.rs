@@ -35,7 +35,16 @@ fn a_scene_as_a_script() {
     let done = folder.run("export-blender scene.toml -o out.py");
     assert!(done.status.success(), "{}", stderr(&done));
     assert!(stderr(&done).contains("distortion"), "{}", stderr(&done));
-    assert!(folder.read("out.py").contains("\"lens_mm\": 30.0"));
+    let script = folder.read("out.py");
+    assert!(script.contains("\"lens_mm\": 30.0"));
+    assert!(script.contains("Not carried as it is:\n- "));
+    folder.write(
+        "plain.toml",
+        "[camera]\nwidth = 8\nheight = 6\nfx = 20\n[[real]]\nshape = \"box\"\nmaterial = { base_color = [0.5, 0.5, 0.5] }\n",
+    );
+    folder.succeed("export-blender plain.toml -o plain.py");
+    let script = folder.read("plain.py");
+    assert!(script.contains("All of it is carried.\n\"\"\"") && !script.contains("Not carried"));
     assert!(folder.bytes("out.numbers").len() > 24 * 16 * 3);
     let refused = folder.run("export-blender scene.toml -o out.txt");
     assert_eq!(refused.status.code(), Some(2));

@@ -18,14 +18,14 @@ mkdir -p "$folder/state" "$folder/spool" "$folder/munge"
 [ -f "$folder/munge/key" ] || (umask 077 && dd if=/dev/urandom of="$folder/munge/key" bs=128 count=1 2>/dev/null)
 chmod 755 "$folder" "$folder/munge"
 socket=$folder/munge/socket
-# A task that was killed ends with 137, and is run again.
+# A task that was killed ends with 137, and is run again after `cred_expire` seconds; below 5, Slurm takes its default, 120.
 cat >"$folder/slurm.conf" <<CONF
 ClusterName=one
 SlurmctldHost=$host
 SlurmUser=root
 AuthType=auth/munge
 CryptoType=crypto/munge
-AuthInfo=socket=$socket,cred_expire=2
+AuthInfo=socket=$socket,cred_expire=5
 StateSaveLocation=$folder/state
 SlurmdSpoolDir=$folder/spool
 SlurmctldPidFile=$folder/slurmctld.pid

@@ -4,7 +4,7 @@
     benches/peers/blender_round_trip.py [SCENE.toml] [--mixray PROGRAM] [--rays N] [-o FOLDER]
 
 Wants a Python with `bpy`, `numpy` and `OpenEXR`. Two seeds of the scene tell its noise: RMS of their difference. The picture of the scene that came
-back, of a third seed, must be as far from the first. The control has lamps that are a fifth brighter.
+back, of a third seed, must be as far from the first. The control has lamps and an environment that are a fifth brighter.
 """
 
 import argparse
@@ -54,7 +54,9 @@ def main():
     shot = export_shot(bpy.context, folder / "back")
     print(shot.report.text())
     brighter = tomllib.loads(shot.scene_file.read_text())
-    for light in brighter["light"]:
+    if "environment" in brighter:
+        brighter["environment"]["scale"] *= 1.2
+    for light in brighter.get("light", []):
         for key in ("radiance", "intensity", "irradiance"):
             if key in light:
                 light[key] = convert.scaled(light[key], 1.2)

@@ -117,7 +117,7 @@ def tracked(folder):
     lens.sensor_width, lens.units, lens.focal_length = 36.0, "MILLIMETERS", 32.0
     lens.k1, lens.k2 = 0.1, -0.02
     points = _add_markers(clip, seen)
-    _solve(clip)
+    solve(clip)
     bundles = [tuple(track.bundle) for track in clip.tracking.tracks]
     seen.matrix_world = _similarity(np.array(bundles), np.array([tuple(p) for p in points]))
     solver = seen.constraints.new("CAMERA_SOLVER")
@@ -149,7 +149,7 @@ def _add_markers(clip, seen):
     return points
 
 
-def _solve(clip):
+def solve(clip):
     """Blender's solver works in a clip editor alone."""
     tracked_object = clip.tracking.objects[0]
     tracked_object.keyframe_a, tracked_object.keyframe_b = 1, 12

@@ -15,13 +15,15 @@ from .report import Report
 
 @dataclass
 class Shot:
-    """What was written. `frames` and `numbers` (first, last + 1) are of a film."""
+    """What was written. Of a film: the folder of its `frames`, their `numbers` (first, last + 1), and of the first its name and the scene's frame."""
 
     scene_file: Path
     report: Report
     trajectory: Path | None = None
     frames: Path | None = None
     numbers: tuple[int, int] | None = None
+    first_name: str | None = None
+    first_frame: int | None = None
 
     def command(self, binary, output):
         """The command line that renders it."""
@@ -29,7 +31,8 @@ class Shot:
             return [binary, "render", str(self.scene_file), "-o", str(output)]
         return [
             *(binary, "sequence", str(self.scene_file), "--frames", str(self.frames)),
-            *("--trajectory", str(self.trajectory), "--range", "{}..{}".format(*self.numbers), "-o", str(output)),
+            *("--trajectory", str(self.trajectory), "--range", "{}..{}".format(*self.numbers)),
+            *("--format", "exr", "--overwrite", "-o", str(output)),
         ]
 
 
@@ -79,7 +82,7 @@ def _export_still(context, photograph, *, scene, folder, report, camera):
 
 def _export_film(context, photograph, *, scene, folder, report, camera):
     first, last = scene.frame_start, scene.frame_end
-    names = photograph.prepare_frames(scene, first, last)
+    names = photograph.prepare_frames(first, last)
     fps = scene.render.fps / scene.render.fps_base
     entries, squares, table, lens = [], [], None, None
     for frame, name in names.items():
@@ -116,6 +119,8 @@ def _export_film(context, photograph, *, scene, folder, report, camera):
         trajectory=trajectory,
         frames=photograph.frames,
         numbers=(min(numbers), max(numbers) + 1),
+        first_name=names[min(names)],
+        first_frame=min(names),
     )
 
 

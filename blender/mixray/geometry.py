@@ -87,6 +87,8 @@ def write_glb(context, things, path, *, animated):
         bpy.ops.export_scene.gltf(
             filepath=str(path),
             export_format="GLB",
+            # Else a file with several scenes has all of them, and its default may be another one.
+            use_active_scene=True,
             use_selection=True,
             use_renderable=True,
             export_apply=True,

@@ -1,15 +1,21 @@
 """Settings of a scene and its lamps, and the panel in the render properties."""
 
+import blf
 import bpy
 from bpy.props import BoolProperty, IntProperty, PointerProperty, StringProperty
+
+from .report import wrapped
+
+# Of a panel's width, at a scale of 1: what the margins of the panel and of a box in it take.
+BOX_MARGINS_PX = 60
 
 
 class Preferences(bpy.types.AddonPreferences):
     bl_idname = __package__
 
     binary: StringProperty(
-        name="mixray",
-        description="The program; its name alone if it is on the path",
+        name="Program",
+        description="mixray; its name alone if it is on the path",
         subtype="FILE_PATH",
         default="mixray",
     )
@@ -59,6 +65,7 @@ class MIXRAY_PT_panel(bpy.types.Panel):
     def draw(self, context):
         layout, settings = self.layout, context.scene.mixray
         layout.use_property_split = True
+        layout.use_property_decorate = False
         layout.prop(settings, "folder")
         layout.prop(settings, "real_collection")
         layout.prop(settings, "is_sequence")
@@ -69,8 +76,19 @@ class MIXRAY_PT_panel(bpy.types.Panel):
         if settings.report:
             box = layout.box()
             box.label(text="Not carried as it is", icon="INFO")
+            column = box.column(align=True)
             for line in settings.report.splitlines():
-                box.label(text=line)
+                _paragraph(column, line, context)
+                column.separator()
+
+
+def _paragraph(column, text, context):
+    """Labels below each other: Blender cuts what is wider than the panel out of the middle of a label."""
+    scale = context.preferences.system.ui_scale
+    blf.size(0, context.preferences.ui_styles[0].widget.points * scale)
+    width_px = context.region.width - BOX_MARGINS_PX * scale
+    for line in wrapped(text, width_px, lambda words: blf.dimensions(0, words)[0]):
+        column.label(text=line)
 
 
 class MIXRAY_PT_lamp(bpy.types.Panel):
@@ -84,6 +102,8 @@ class MIXRAY_PT_lamp(bpy.types.Panel):
         return context.object is not None and context.object.type == "LIGHT"
 
     def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
         self.layout.prop(context.object.mixray, "is_added")
 
 

@@ -69,16 +69,18 @@ class Photograph:
             return None
         if self.clip is None:
             return image_file(self.source, self.folder)
-        name = self._frame_file(scene.frame_current, scene)
+        name = self._frame_file(scene.frame_current)
+        if name is None:
+            raise Refused(f"{self.clip.name} has no frame {scene.frame_current}; go to one of its frames, or correct the clip's start")
         return relative(self.frames / name, self.folder)
 
-    def prepare_frames(self, scene, first, last):
+    def prepare_frames(self, first, last):
         """File names of a clip's frames by the scene's frame numbers; those before and behind the clip are left out."""
         if self.clip is None:
             raise Refused("a sequence needs a movie clip, an image sequence or a movie as the camera's background; give it one, or export a still")
         names = {}
         for frame in range(first, last + 1):
-            name = self._frame_file(frame, scene)
+            name = self._frame_file(frame)
             if name is not None:
                 names[frame] = name
         missing = last + 1 - first - len(names)
@@ -88,11 +90,14 @@ class Photograph:
             raise Refused(f"{self.clip.name} has none of the frames {first} to {last}; correct the scene's frame range or the clip's start")
         return names
 
-    def _frame_file(self, frame, scene):
+    def _frame_file(self, frame):
         """Name in `frames` of the picture at a frame of the scene, None where there is none."""
         number = frame - self.frame_start + 1 + self.frame_offset
         if self.clip.source == "MOVIE":
-            self._decode_movie(scene)
+            self._decode_movie()
+            # The folder may hold frames of a longer movie that was there before.
+            if not 1 <= number <= self.clip.frame_duration:
+                return None
             name = f"{number:06}.png"
         else:
             first = Path(bpy.path.abspath(self.clip.filepath))
@@ -104,7 +109,7 @@ class Photograph:
             name = first.name[: digits.start()] + counted + first.name[digits.end() :]
         return name if (self.frames / name).is_file() else None
 
-    def _decode_movie(self, scene):
+    def _decode_movie(self):
         """A movie's frames as PNG files, once, by Blender's own decoder."""
         if self.frames is not None:
             return

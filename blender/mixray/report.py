@@ -17,3 +17,14 @@ class Report:
 
     def text(self):
         return "".join(f"{line}\n" for line in self.lines) or "everything is carried\n"
+
+
+def wrapped(text, width_px, measure_px):
+    """Lines of whole words, none wider than a width but for a word that is; `measure_px` gives the width of words."""
+    lines = []
+    for word in text.split():
+        if lines and measure_px(f"{lines[-1]} {word}") <= width_px:
+            lines[-1] += f" {word}"
+        else:
+            lines.append(word)
+    return lines

@@ -1,4 +1,8 @@
-"""A rendered picture back in the compositor: its layers, and a node group that puts the composite together anew."""
+"""Rendered pictures back in the compositor: their layers, and a node group that puts the composite together anew."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
 from bpy.props import StringProperty
@@ -6,15 +10,33 @@ from bpy.props import StringProperty
 GROUP = "mixray composite"
 
 
-def load_picture(scene, path):
-    """Image nodes of the EXR and the photograph, and the group between them and the output; returns the group's node."""
+@dataclass
+class Film:
+    """Of numbered pictures: the scene's frame at the first, the number in its name, and how many there are."""
+
+    scene_frame: int
+    number: int
+    count: int
+
+    def show(self, user):
+        """Has a node, or what else shows an image, follow the scene's frames."""
+        user.frame_start, user.frame_duration, user.frame_offset = self.scene_frame, self.count, self.number - 1
+        user.use_auto_refresh = True
+
+
+def load_picture(scene, path, film=None):
+    """Image nodes of the EXR, the first one of a film, and of the photograph, and the group between them and the output; returns the group's node."""
     tree, output = _compositor(scene)
     for node in [n for n in tree.nodes if n.label.startswith("mixray")]:
         tree.nodes.remove(node)
-    picture = _image_node(tree, bpy.data.images.load(str(path), check_existing=True), "mixray layers", (-600, 0))
-    picture.image.reload()
+    image = bpy.data.images.load(str(path), check_existing=True)
+    image.source = "SEQUENCE" if film else "FILE"
+    image.reload()
+    picture = _image_node(tree, image, "mixray layers", (-600, 0))
+    if film:
+        film.show(picture)
     group = tree.nodes.new("CompositorNodeGroup")
-    group.node_tree, group.label, group.location = _group(), "mixray composite", (-200, 0)
+    group.node_tree, group.label, group.location, group.width = _group(), "mixray composite", (-300, 0), 280
     tree.links.new(picture.outputs["Combined"], group.inputs["Composite"])
     tree.links.new(picture.outputs["mask"], group.inputs["Mask"])
     photograph = _photograph_node(tree, scene)
@@ -42,7 +64,7 @@ def _compositor(scene):
 
 def _image_node(tree, image, label, location):
     node = tree.nodes.new("CompositorNodeImage")
-    node.image, node.label, node.location = image, label, location
+    node.image, node.label, node.location, node.width = image, label, location, 240
     return node
 
 
@@ -51,10 +73,14 @@ def _photograph_node(tree, scene):
     for background in backgrounds:
         if background.source == "MOVIE_CLIP" and background.clip:
             node = tree.nodes.new("CompositorNodeMovieClip")
-            node.clip, node.label, node.location = background.clip, "mixray photograph", (-600, 400)
+            node.clip, node.label, node.location, node.width = background.clip, "mixray photograph", (-600, 400), 240
             return node
         if background.source == "IMAGE" and background.image:
-            return _image_node(tree, background.image, "mixray photograph", (-600, 400))
+            node = _image_node(tree, background.image, "mixray photograph", (-600, 400))
+            if background.image.source in ("SEQUENCE", "MOVIE"):
+                user = background.image_user
+                Film(user.frame_start, user.frame_offset + 1, user.frame_duration).show(node)
+            return node
     return None
 
 
@@ -117,7 +143,7 @@ def _mix(tree, operation, first, second):
 class MIXRAY_OT_load_result(bpy.types.Operator):
     bl_idname = "mixray.load_result"
     bl_label = "Load layers"
-    bl_description = "Load a picture that mixray rendered, as layers, into the compositor"
+    bl_description = "Load a picture that mixray rendered, as layers, into the compositor; of a frame range its first one"
 
     filepath: StringProperty(subtype="FILE_PATH")
     filter_glob: StringProperty(default="*.exr", options={"HIDDEN"})
@@ -127,7 +153,15 @@ class MIXRAY_OT_load_result(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context):
-        load_picture(context.scene, self.filepath)
+        scene, path = context.scene, Path(self.filepath)
+        film = None
+        if scene.mixray.is_sequence:
+            digits = re.search(r"(\d+)(?=\D*$)", path.stem)
+            if digits is None:
+                self.report({"ERROR"}, f"{path.name} has no frame number in its name; choose the first picture of the range, or switch Frame range off")
+                return {"CANCELLED"}
+            film = Film(scene.frame_start, int(digits[1]), scene.frame_end - scene.frame_start + 1)
+        load_picture(scene, path, film)
         return {"FINISHED"}
 
 

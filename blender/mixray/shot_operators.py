@@ -8,7 +8,7 @@ import bpy
 
 from .export import export_shot
 from .report import Refused
-from .results import load_picture
+from .results import Film, load_picture
 
 
 def folder_of(scene):
@@ -49,7 +49,7 @@ class MIXRAY_OT_export(bpy.types.Operator):
 class MIXRAY_OT_render(bpy.types.Operator):
     bl_idname = "mixray.render"
     bl_label = "Export and render"
-    bl_description = "Export the shot, render it with mixray, and load a still's layers into the compositor"
+    bl_description = "Export the shot, render it with mixray, and load the layers into the compositor"
 
     def execute(self, context):
         if not self._start(context):
@@ -79,7 +79,14 @@ class MIXRAY_OT_render(bpy.types.Operator):
         if shot is None:
             return False
         folder = shot.scene_file.parent
-        self.output = folder / ("frames-out" if shot.trajectory else "result.exr")
+        if shot.trajectory:
+            first, end = shot.numbers
+            self.film = Film(shot.first_frame, first, end - first)
+            self.output = folder / "frames-out"
+            self.picture = self.output / Path(shot.first_name).with_suffix(".exr").name
+        else:
+            self.film = None
+            self.output = self.picture = folder / "result.exr"
         self.log = folder / "mixray.log"
         try:
             with self.log.open("w") as log:
@@ -91,12 +98,16 @@ class MIXRAY_OT_render(bpy.types.Operator):
 
     def _end(self, context):
         code = self.process.returncode
+        lines = self.log.read_text(errors="replace").strip().splitlines()
+        for line in lines:
+            if line.startswith("warning: "):
+                self.report({"WARNING"}, line.removeprefix("warning: "))
         if code not in (0, 130):
-            lines = self.log.read_text(errors="replace").strip().splitlines()
             self.report({"ERROR"}, f"mixray: {lines[-1] if lines else f'ended with code {code}'}")
             return {"CANCELLED"}
-        if self.output.suffix == ".exr":
-            load_picture(context.scene, self.output)
+        # Ended early, a film may have no frame yet.
+        if self.picture.is_file():
+            load_picture(context.scene, self.picture, self.film)
         self.report({"INFO"}, f"rendered: {self.output}")
         return {"FINISHED"}
 

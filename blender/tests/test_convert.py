@@ -1,4 +1,4 @@
-"""The extension's conversions against closed forms, without Blender: python3 -m unittest discover blender/tests"""
+"""The extension's conversions against closed forms, and its report, without Blender: python3 -m unittest discover blender/tests"""
 
 import importlib.util
 import json
@@ -8,11 +8,18 @@ import tomllib
 import unittest
 from pathlib import Path
 
-# The package itself wants `bpy`; this file of it does not.
-FILE = Path(__file__).resolve().parents[1] / "mixray" / "convert.py"
-SPEC = importlib.util.spec_from_file_location("convert", FILE)
-convert = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(convert)
+
+
+def module(name):
+    """A file of the package that does not want `bpy`, as the package itself does."""
+    path = Path(__file__).resolve().parents[1] / "mixray" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    return made
+
+
+convert, report = module("convert"), module("report")
 
 IDENTITY = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 WHITE = [1.0, 1.0, 1.0]
@@ -165,6 +172,30 @@ class Files(unittest.TestCase):
         text = json.dumps({"meshes": []}).encode()
         data = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text
         self.assertEqual(convert.glb_document(data), {"meshes": []})
+
+
+class Reports(unittest.TestCase):
+    def test_lines_are_said_once(self):
+        made = report.Report()
+        self.assertEqual(made.text(), "everything is carried\n")
+        for how in ("hard shadows", "hard shadows", "round"):
+            made.add("lamp", how)
+        self.assertEqual(made.text(), "lamp: hard shadows\nlamp: round\n")
+
+    def test_lines_fit_a_width(self):
+        def width(words):
+            return 10 * len(words)
+
+        text = "lamp: the radius of a spot is not carried: its shadows are hard"
+        for width_px in (120, 200, 10000):
+            lines = report.wrapped(text, width_px, width)
+            self.assertEqual(" ".join(lines), text)
+            self.assertLessEqual(max(map(width, lines)), width_px)
+            # None could be longer: the next line's first word does not fit in.
+            for line, after in zip(lines, lines[1:]):
+                self.assertGreater(width(f"{line} {after.split()[0]}"), width_px)
+        self.assertEqual(len(report.wrapped(text, 10000, width)), 1)
+        self.assertEqual(report.wrapped("a verylongword b", 30, width), ["a", "verylongword", "b"])
 
 
 if __name__ == "__main__":

@@ -64,12 +64,9 @@ pub fn script(scene: &Scene, numbers_name: &str) -> BlenderScene {
     }
     BlenderScene {
         script: format!(
-            "#!/usr/bin/env python3\n\"\"\"The scene {} in Blender: run it in the text editor, or `blender --python` it.\n\nNot carried as it is:\n{}\"\"\"\n\nSCENE = r'''\n{}\n'''\n\n{BUILD}",
+            "#!/usr/bin/env python3\n\"\"\"The scene {} in Blender: run it in the text editor, or `blender --python` it.\n\n{}\"\"\"\n\nSCENE = r'''\n{}\n'''\n\n{BUILD}",
             harmless(&scene.name),
-            listed
-                .iter()
-                .map(|note| format!("- {}\n", harmless(note)))
-                .collect::<String>(),
+            told(&listed),
             // Names may hold quotes, which would end the text.
             serde_json::to_string_pretty(&description)
                 .unwrap_or_default()
@@ -78,6 +75,15 @@ pub fn script(scene: &Scene, numbers_name: &str) -> BlenderScene {
         numbers: numbers.bytes,
         notes: listed,
     }
+}
+
+/// For the script's reader.
+fn told(notes: &[String]) -> String {
+    if notes.is_empty() {
+        return "All of it is carried.\n".to_owned();
+    }
+    let lines = notes.iter().map(|note| format!("- {}\n", harmless(note)));
+    format!("Not carried as it is:\n{}", lines.collect::<String>())
 }
 
 /// Text of a user in a docstring.

@@ -28,10 +28,12 @@ pub(super) fn files(job: &Job) -> Vec<(&'static str, String)> {
         head = head(job, "merge.log"),
         merge = shell_words(&job.merge, ""),
     );
+    // Not `afterok`: of an array it is never met once a try of a task has failed, though the next one succeeds (Slurm 22.05).
     let submit = format!(
-        "#!/bin/sh\n# Hands the job over: the tasks, and what puts them together once all have succeeded. Options for sbatch may follow.\n\
+        "#!/bin/sh\n# Hands the job over: the tasks, and what puts them together once all have ended and looks at what each has left.\n\
+        # Options for sbatch may follow.\n\
         set -e\ncd \"$(dirname \"$0\")\"\ntasks=$(sbatch --parsable --job-name={name} \"$@\" tasks.sbatch)\n\
-        sbatch --job-name={name} --dependency=\"afterok:${{tasks%%;*}}\" \"$@\" merge.sbatch\n"
+        sbatch --job-name={name} --dependency=\"afterany:${{tasks%%;*}}\" \"$@\" merge.sbatch\n"
     );
     vec![
         ("parts.txt", parts),

@@ -171,7 +171,7 @@ fn jobs_for_slurm() {
     assert!(
         folder
             .read("job/submit.sh")
-            .contains("--dependency=\"afterok:")
+            .contains("--dependency=\"afterany:")
     );
     // As Slurm runs them: one script, one number each.
     let run = |script: &str, task: u32| {
