@@ -111,7 +111,10 @@ pub fn exp_(x: f32) -> f32 {
         return 0.0;
     }
     let bounded = x.min(88.0);
-    let n = (bounded * LOG2_E + 0.5).floor();
+    let scaled = bounded * LOG2_E + 0.5;
+    // Its floor: a call of the library where processors need not have the instruction.
+    let whole = scaled as i32 as f32;
+    let n = if whole > scaled { whole - 1.0 } else { whole };
     // max never acts: a shader compiler that may reassociate would otherwise merge the two parts of ln 2
     let r = (bounded - n * LN_2_HI).max(-1.0) - n * LN_2_LO;
     // (e^r - 1 - r) / r^2
