@@ -11,7 +11,7 @@ use super::threads::ThreadsFlag;
 use super::track_values::{Chosen, Gamma, family, gamma};
 use super::values::{above_zero, choice, rays_per_pixel};
 use super::{Failure, Outcome, interrupt, say};
-use crate::live::{LiveEvent, LiveOptions, run_live};
+use crate::live::{LiveEvent, LiveOptions, LiveStats, run_live};
 use crate::output::{check_writable_as, write_text};
 use crate::renderer::Watcher;
 use crate::scene::{BackendChoice, Overrides};
@@ -28,9 +28,13 @@ pub(super) struct Arguments {
     /// Y4M file or pipe, or - for standard input
     #[arg(long, value_name = "PATH", default_value = "-")]
     input: PathBuf,
-    /// .y4m file, or - for standard output
-    #[arg(short, long, value_name = "PATH", default_value = "-")]
-    output: PathBuf,
+    /// .y4m file, or - for standard output [default: -, with --window none]
+    #[arg(short, long, value_name = "PATH")]
+    output: Option<PathBuf>,
+    /// Shows the newest frame, and how it goes, in a window that Esc closes
+    #[cfg(feature = "preview")]
+    #[arg(long)]
+    window: bool,
     /// What is in the stream: a board's file, or the report (track --report) of a video of it, whose bent paper and gamma are taken over
     #[arg(long, value_name = "FILE")]
     board: PathBuf,
@@ -86,13 +90,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
-    let hear = |event: &LiveEvent<'_>| match event {
-        LiveEvent::Warning(message) => say("warning", message),
-        LiveEvent::Note(message) => say("note", message),
-        LiveEvent::Summary(window) => say("live", &window.text()),
+    let stats = match arguments.is_shown() {
+        #[cfg(feature = "preview")]
+        true => run_in_window(arguments, &cancelled)?,
+        _ => run_live(
+            &arguments.options(),
+            &Watcher::none().cancelled_by(&cancelled),
+            &tell,
+        )?,
     };
-    let watcher = Watcher::none().cancelled_by(&cancelled);
-    let stats = run_live(&arguments.options(), &watcher, &hear)?;
     // Standard output may be the film.
     summarize_aside(&stats.text());
     if let Some(path) = &arguments.stats {
@@ -101,7 +107,68 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
+fn tell(event: &LiveEvent<'_>) {
+    match event {
+        LiveEvent::Warning(message) => say("warning", message),
+        LiveEvent::Note(message) => say("note", message),
+        LiveEvent::Summary(window) => say("live", &window.text()),
+        LiveEvent::Frame(_) => {}
+    }
+}
+
+/// The window wants the program's first thread; the stream runs on another.
+#[cfg(feature = "preview")]
+fn run_in_window(
+    arguments: &Arguments,
+    cancelled: &(dyn Fn() -> bool + Sync),
+) -> Result<LiveStats, Failure> {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    use crate::preview::window::{StreamFeed, show_stream};
+
+    let feed = Arc::new(StreamFeed::default());
+    let is_closed = AtomicBool::new(false);
+    let hear = |event: &LiveEvent<'_>| {
+        tell(event);
+        match event {
+            LiveEvent::Frame(frame) => {
+                feed.show([frame.width as usize, frame.height as usize], &frame.codes);
+            }
+            LiveEvent::Summary(window) => feed.say(window.text()),
+            LiveEvent::Warning(_) | LiveEvent::Note(_) => {}
+        }
+    };
+    let run = || {
+        let ends = || cancelled() || is_closed.load(Ordering::Relaxed);
+        let watcher = Watcher::none().cancelled_by(&ends);
+        let stats = run_live(&arguments.options(), &watcher, &hear);
+        feed.end();
+        stats
+    };
+    let title = format!("mixray live {}", arguments.scene.display());
+    std::thread::scope(|scope| {
+        let running = std::thread::Builder::new()
+            .stack_size(super::pool::STACK_BYTES)
+            .spawn_scoped(scope, run)?;
+        let shown = show_stream(&title, &feed);
+        is_closed.store(true, Ordering::Relaxed);
+        let stats = running
+            .join()
+            .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        shown?;
+        Ok(stats?)
+    })
+}
+
 impl Arguments {
+    fn is_shown(&self) -> bool {
+        #[cfg(feature = "preview")]
+        return self.window;
+        #[cfg(not(feature = "preview"))]
+        false
+    }
+
     fn options(&self) -> LiveOptions {
         LiveOptions {
             scene: self.scene.clone(),
@@ -111,7 +178,11 @@ impl Arguments {
                 ..Overrides::default()
             },
             input: self.input.clone(),
-            output: self.output.clone(),
+            output: match &self.output {
+                None if self.is_shown() => None,
+                given => Some(given.clone().unwrap_or_else(|| PathBuf::from("-"))),
+            },
+            shows: self.is_shown(),
             board: self.board.clone(),
             code: self.family.0.map(Code::Family),
             intrinsics: self.intrinsics.clone(),

@@ -123,9 +123,17 @@ impl<E: std::error::Error> From<E> for Failure {
 pub fn run() -> ExitCode {
     quiet_device_selection();
     // Windows are opened by the main thread alone.
-    match std::env::args_os().nth(1) {
-        Some(command) if command == "preview" => run_command(),
-        _ => pool::on_large_stack(run_command),
+    match opens_window(std::env::args_os()) {
+        true => run_command(),
+        false => pool::on_large_stack(run_command),
+    }
+}
+
+fn opens_window(mut words: impl Iterator<Item = OsString>) -> bool {
+    match words.nth(1) {
+        Some(command) if command == "live" => words.any(|word| word == "--window"),
+        Some(command) => command == "preview",
+        None => false,
     }
 }
 

@@ -10,7 +10,7 @@ use rayon::{ThreadBuilder, ThreadPoolBuilder};
 use super::{Failure, say};
 
 /// Of the thread that a command runs on. The main thread's own stack is as small as the shell's limit says.
-const STACK_BYTES: usize = 8 << 20;
+pub(super) const STACK_BYTES: usize = 8 << 20;
 
 /// Runs a command on a stack of our own; on the caller's where no thread can be made.
 pub(super) fn on_large_stack<T: Send + 'static>(work: fn() -> T) -> T {

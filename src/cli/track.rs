@@ -7,13 +7,14 @@ use clap::Args;
 use super::progress::Steps;
 use super::terminal::summarize;
 use super::threads::ThreadsFlag;
-use super::track_values::{Chosen, Gamma, family, flatness, gamma};
+use super::track_values::{Chosen, Gamma, family, flatness, gamma, readout};
 use super::values::length;
 use super::{Failure, Outcome};
 use crate::output::{check_writable, check_writable_as, extension_among, write_bytes, write_text};
 use crate::scene::trajectory::{Focal, read_intrinsics};
 use crate::tracking::{
-    Code, Flatness, Lens, Target, TrackOptions, USUAL_SHARE, read_board, read_patterns, track,
+    Code, Flatness, Lens, Readout, Target, TrackOptions, USUAL_SHARE, read_board, read_patterns,
+    track,
 };
 
 /// Finds the camera's pose in every frame from markers or a chessboard
@@ -55,6 +56,9 @@ pub(super) struct Arguments {
     /// How far the board's surface may bend out of its plane, or "rigid"
     #[arg(long, value_name = "LENGTH", default_value = "2mm", value_parser = flatness)]
     board_flatness: Flatness,
+    /// From the sensor's first row to its last, such as 20ms (below 0: from the lowest row up), or "solve"; poses are then those of the middle row's time
+    #[arg(long, value_name = "TIME", value_parser = readout, allow_hyphen_values = true)]
+    readout_time: Option<Readout>,
     /// Smooths the poses by what their covariances leave open, and says how far they were moved
     #[arg(long)]
     smooth: bool,
@@ -160,6 +164,7 @@ impl Arguments {
             fix_lens: self.fix_intrinsics,
             tone: self.gamma.0,
             flatness: self.board_flatness,
+            readout: self.readout_time,
         })
     }
 

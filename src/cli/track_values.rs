@@ -1,7 +1,7 @@
 //! How the values of flags about markers are read, where several commands take the like.
 
 use super::values::length;
-use crate::tracking::{Family, Flatness, Tone, family_named};
+use crate::tracking::{Family, Flatness, Readout, Tone, family_named};
 
 /// `None`: whichever is found.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +36,17 @@ pub(super) fn flatness(text: &str) -> Result<Flatness, &'static str> {
     }
 }
 
+pub(super) fn readout(text: &str) -> Result<Readout, &'static str> {
+    if text == "solve" {
+        return Ok(Readout::Solve);
+    }
+    let number = |unit: &str| text.strip_suffix(unit)?.trim().parse::<f64>().ok();
+    let secs = number("ms").map(|ms| ms / 1e3).or_else(|| number("s"));
+    secs.filter(|secs| secs.is_finite())
+        .map(Readout::Known)
+        .ok_or("expected a time with its unit such as 20ms, or solve")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -49,6 +60,10 @@ mod tests {
             assert!(length(wrong).is_err(), "{wrong}");
         }
         assert!(flatness("rigid").unwrap().is_rigid() && !flatness("2mm").unwrap().is_rigid());
+        assert_eq!(readout("20ms"), readout("0.02s"));
+        assert_eq!(readout("-8.5 ms"), Ok(Readout::Known(-8.5e-3)));
+        assert_eq!(readout("solve"), Ok(Readout::Solve));
+        assert!(readout("20").is_err() && readout("infms").is_err() && readout("ms").is_err());
         assert!(gamma("9").is_err() && gamma("1.4").is_ok() && family("hiro").is_err());
     }
 }

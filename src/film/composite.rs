@@ -12,7 +12,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Film, PixelSums};
+use super::{Film, PixelSums, Sum3};
 use crate::scene::{Composite, Photo};
 
 /// The quotient composite divides by no less than this (linear photograph values; under half an 8-bit code at black).
@@ -60,6 +60,26 @@ pub fn composite(film: &Film, photo: Option<&Photo>, mode: Composite) -> Picture
         width: film.width,
         height: film.height,
         linear,
+    }
+}
+
+/// The same with other differences where there are any, by pixel.
+pub fn composite_smoothed(
+    film: &Film,
+    differences: &[Option<Sum3>],
+    photo: Option<&Photo>,
+    mode: Composite,
+) -> Picture {
+    let pixels = differences.par_iter().enumerate();
+    let linear = pixels.map(|(pixel, smoothed)| {
+        let mut sums = film.sums(pixel);
+        sums.diff = smoothed.unwrap_or(sums.diff);
+        composite_pixel(&sums, photo_at(photo, pixel), mode)
+    });
+    Picture {
+        width: film.width,
+        height: film.height,
+        linear: linear.collect(),
     }
 }
 

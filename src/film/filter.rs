@@ -43,64 +43,51 @@ const ENOUGH_SAMPLES: u32 = 4;
 
 /// The film with its difference smoothed where `surfaces` (one a pixel) knows a diffuse real surface and samples met it.
 pub fn filter_difference(film: &Film, surfaces: &[Option<RealSurface>]) -> Film {
+    let smoothed = smoothed_difference(film, surfaces);
     let mut out = film.clone();
     // What photons brought is smoothed with the rest.
     out.set_photons(false);
-    if !film.splats.is_empty() {
-        for (pixel, sums) in out.pixels.iter_mut().enumerate() {
-            *sums = film.sums(pixel);
-        }
+    for (pixel, (sums, smoothed)) in out.pixels.iter_mut().zip(smoothed).enumerate() {
+        *sums = film.sums(pixel);
+        sums.diff = smoothed.unwrap_or(sums.diff);
     }
-    let canvas = Canvas {
-        width: film.width as i32,
-        height: film.height as i32,
-        surfaces: (out.pixels.iter().zip(surfaces))
-            .map(|(sums, surface)| surface.filter(|_| sums.m < sums.n))
-            .collect(),
-    };
-    let pixels = &out.pixels;
-    let mut light: Vec<Vec3> = canvas.each(|place, surface| {
-        let sums = &pixels[place.pixel];
-        (sums.diff.value() / real_samples(sums)).as_vec3() / divisor(surface)
-    });
-    let brightness = brightness_of(&light);
-    let own: Vec<f32> =
-        canvas.each(|place, surface| own_variance(&pixels[place.pixel], divisor(surface)));
-    let variance: Vec<f32> = canvas.each(|place, surface| {
-        let by_samples = pixels[place.pixel].n >= ENOUGH_SAMPLES;
-        canvas.variance(place, surface, by_samples, &brightness, &own)
-    });
-    let mut variance = canvas.blurred(&variance);
-    for level in 0..LEVELS {
-        let brightness = brightness_of(&light);
-        let both: Vec<(Vec3, f32)> = canvas.each(|place, surface| {
-            let values = Values {
-                light: &light,
-                brightness: &brightness,
-                variance: &variance,
-            };
-            canvas.level(place, surface, 1 << level, &values)
-        });
-        (light, variance) = both.into_iter().unzip();
-    }
-    out.pixels
-        .par_iter_mut()
-        .zip(&canvas.surfaces)
-        .zip(&light)
-        .for_each(|((sums, surface), light)| {
-            if let Some(surface) = surface {
-                let sum = (*light * divisor(surface)).as_dvec3() * real_samples(sums);
-                sums.diff = Sum3 {
-                    hi: sum.as_vec3().to_array(),
-                    lo: [0.0; 3],
-                };
-            }
-        });
     out
 }
 
-fn brightness_of(light: &[Vec3]) -> Vec<f32> {
-    light.iter().map(|light| luminance(*light)).collect()
+/// By pixel, the sum of its differences after smoothing; `None`: it stays as it is.
+pub fn smoothed_difference(film: &Film, surfaces: &[Option<RealSurface>]) -> Vec<Option<Sum3>> {
+    let canvas = Canvas {
+        width: film.width as i32,
+        height: film.height as i32,
+        surfaces: (film.pixels.par_iter().zip(surfaces))
+            .map(|(sums, surface)| surface.filter(|_| sums.m < sums.n))
+            .collect(),
+    };
+    let light: Vec<Vec3> = canvas.each(|place, surface| {
+        let sums = film.sums(place.pixel);
+        (sums.diff.value() / real_samples(&sums)).as_vec3() / divisor(surface)
+    });
+    let brightness: Vec<f32> = light.par_iter().map(|light| luminance(*light)).collect();
+    let own: Vec<f32> =
+        canvas.each(|place, surface| own_variance(&film.sums(place.pixel), divisor(surface)));
+    let variance: Vec<f32> = canvas.each(|place, surface| {
+        let by_samples = film.pixels[place.pixel].n >= ENOUGH_SAMPLES;
+        canvas.variance(place, surface, by_samples, &brightness, &own)
+    });
+    let variance = canvas.blurred(&variance);
+    let mut values: Vec<Value> =
+        canvas.each(|Place { pixel, .. }, _| Value::of(light[pixel], variance[pixel]));
+    for level in 0..LEVELS {
+        values = canvas.each(|place, surface| canvas.level(place, surface, 1 << level, &values));
+    }
+    canvas.each(|place, surface| {
+        let sums = &film.pixels[place.pixel];
+        let sum = (values[place.pixel].light * divisor(surface)).as_dvec3() * real_samples(sums);
+        Some(Sum3 {
+            hi: sum.as_vec3().to_array(),
+            lo: [0.0; 3],
+        })
+    })
 }
 
 fn real_samples(sums: &PixelSums) -> f64 {
@@ -138,31 +125,48 @@ struct Place {
     pixel: usize,
 }
 
-/// What a level of the wavelet reads, by pixel.
-struct Values<'a> {
-    light: &'a [Vec3],
+/// What a level of the wavelet makes of a pixel.
+#[derive(Clone, Copy, Default)]
+struct Value {
+    light: Vec3,
     /// Its luminance.
-    brightness: &'a [f32],
-    variance: &'a [f32],
+    brightness: f32,
+    variance: f32,
+}
+
+impl Value {
+    fn of(light: Vec3, variance: f32) -> Self {
+        Self {
+            light,
+            brightness: luminance(light),
+            variance,
+        }
+    }
 }
 
 impl Canvas {
     /// A value for each pixel; the default where there is nothing to filter.
-    fn each<T: Default + Send>(&self, f: impl Fn(Place, &RealSurface) -> T + Sync) -> Vec<T> {
+    fn each<T: Default + Clone + Send>(
+        &self,
+        f: impl Fn(Place, &RealSurface) -> T + Sync,
+    ) -> Vec<T> {
         let width = self.width as usize;
-        let rows = self.surfaces.par_chunks(width).enumerate();
-        rows.flat_map_iter(|(y, row)| {
-            let f = &f;
-            row.iter().enumerate().map(move |(x, surface)| {
+        let mut values = vec![T::default(); self.surfaces.len()];
+        let rows = values.par_chunks_mut(width).enumerate();
+        rows.for_each(|(y, row)| {
+            let surfaces = &self.surfaces[y * width..][..width];
+            for (x, (value, surface)) in row.iter_mut().zip(surfaces).enumerate() {
                 let place = Place {
                     x: x as i32,
                     y: y as i32,
                     pixel: y * width + x,
                 };
-                surface.as_ref().map_or_else(T::default, |s| f(place, s))
-            })
-        })
-        .collect()
+                if let Some(surface) = surface {
+                    *value = f(place, surface);
+                }
+            }
+        });
+        values
     }
 
     /// The pixel this far away, if it lies on the picture and is filtered too.
@@ -231,20 +235,13 @@ impl Canvas {
         })
     }
 
-    /// One level of the wavelet: light and its variance.
-    fn level(
-        &self,
-        place: Place,
-        surface: &RealSurface,
-        step: i32,
-        values: &Values<'_>,
-    ) -> (Vec3, f32) {
-        let here = values.brightness[place.pixel];
-        let variance = values.variance[place.pixel];
-        let per_deviation = 1.0 / (DEVIATIONS * variance.sqrt() + 1e-6);
+    /// One level of the wavelet.
+    fn level(&self, place: Place, surface: &RealSurface, step: i32, values: &[Value]) -> Value {
+        let here = values[place.pixel];
+        let per_deviation = 1.0 / (DEVIATIONS * here.variance.sqrt() + 1e-6);
         let mut weights = KERNEL[0] * KERNEL[0];
-        let mut sum = values.light[place.pixel] * weights;
-        let mut spread = variance * weights * weights;
+        let mut sum = here.light * weights;
+        let mut spread = here.variance * weights * weights;
         for dy in -1..=1_i32 {
             for dx in -1..=1_i32 {
                 let Some((at, other)) = self.neighbour(place, dx * step, dy * step) else {
@@ -253,19 +250,20 @@ impl Canvas {
                 if at == place.pixel {
                     continue;
                 }
+                let there = values[at];
                 let exponent = plane_exponent(surface, other)
-                    - (values.brightness[at] - here).abs() * per_deviation;
+                    - (there.brightness - here.brightness).abs() * per_deviation;
                 if exponent < LEAST_EXPONENT {
                     continue;
                 }
                 let [kx, ky] = [dx, dy].map(|d| KERNEL[d.unsigned_abs() as usize]);
                 let weight = kx * ky * same_way(surface, other) * exp_(exponent);
                 weights += weight;
-                sum += values.light[at] * weight;
-                spread += values.variance[at] * weight * weight;
+                sum += there.light * weight;
+                spread += there.variance * weight * weight;
             }
         }
-        (sum / weights, spread / (weights * weights))
+        Value::of(sum / weights, spread / (weights * weights))
     }
 }
 

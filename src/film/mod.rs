@@ -21,10 +21,10 @@ pub use combine::{Combined, combine_robustly, group_counts};
 pub use compare::{Comparison, SizeMismatch, compare};
 pub(crate) use composite::Means;
 pub use composite::{
-    Picture, Planes, QUOTIENT_EPSILON, background_pixel, composite, estimated_error, planes,
-    variance,
+    Picture, Planes, QUOTIENT_EPSILON, background_pixel, composite, composite_smoothed,
+    estimated_error, planes, variance,
 };
-pub use filter::{RealSurface, filter_difference};
+pub use filter::{RealSurface, filter_difference, smoothed_difference};
 pub use final_filter::filter_finally;
 pub use flip::{flip, flip_map};
 pub use groups::{GROUPS, GroupSums, group_add};

@@ -1,5 +1,6 @@
 //! The newest frame, over and over.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use glam::{DMat4, DVec3};
@@ -9,8 +10,9 @@ use super::intake::{Arrived, Intake};
 use super::ray_budget::RayBudget;
 use super::report::{Became, LiveSeconds, LiveStats, Tally};
 use super::slot::Fetched;
-use super::{LiveError, LiveEvent, LiveOptions};
-use crate::output::ExrLayers;
+use super::{LiveError, LiveEvent, LiveFrame, LiveOptions};
+use crate::film::Picture;
+use crate::output::{ExrLayers, picture_codes8};
 use crate::pack::next_anchor;
 use crate::renderer::{
     Budget, Filter, FrameEdit, NeighbourView, Renderer, RendererOptions, Watcher,
@@ -18,7 +20,7 @@ use crate::renderer::{
 use crate::scene::Composite;
 use crate::scene::trajectory::{CameraPath, FrameName, Intrinsics, read_intrinsics};
 use crate::scene::{
-    Camera, Content, ContentHash, Given, MotionBlurMethod, Photo, Scene, load_with,
+    Camera, Content, ContentHash, EncodedPhoto, Given, MotionBlurMethod, Photo, Scene, load_with,
 };
 use crate::stages::{Finished, GpuStages, finish};
 use crate::tracking::{Follower, KnownBoard, Lens, Luma, read_known_board};
@@ -45,7 +47,7 @@ pub fn run_live(
     let begin = Instant::now();
     let mut live = Live {
         options,
-        output: output_of(options)?,
+        film: film_of(options)?,
         known,
         intrinsics,
         begin,
@@ -59,7 +61,7 @@ pub fn run_live(
         hear,
     };
     // Who reads standard output need not wait for the first frame.
-    if live.output == FrameOutput::Stdout {
+    if matches!(live.film, Some((_, FrameOutput::Stdout))) {
         live.sink()?;
     }
     let mut window_began = begin;
@@ -82,20 +84,24 @@ pub fn run_live(
     Ok(stats)
 }
 
-fn output_of(options: &LiveOptions) -> Result<FrameOutput, LiveError> {
-    let is_film = options.output.extension().is_some_and(|e| e == "y4m");
-    if !is_film && options.output.as_os_str() != "-" {
+/// Where frames are written; `None`: they are not.
+fn film_of(options: &LiveOptions) -> Result<Option<(&Path, FrameOutput)>, LiveError> {
+    let Some(path) = options.output.as_deref() else {
+        return Ok(None);
+    };
+    let is_film = path.extension().is_some_and(|e| e == "y4m");
+    if !is_film && path.as_os_str() != "-" {
         return Err(LiveError::Unfit(format!(
             "{}: a stream goes to a film; expected a .y4m file, or -; name one",
-            options.output.display()
+            path.display()
         )));
     }
-    Ok(FrameOutput::of(&options.output, None)?)
+    Ok(Some((path, FrameOutput::of(path, None)?)))
 }
 
 fn open_sink(
     options: &LiveOptions,
-    output: FrameOutput,
+    (path, output): (&Path, FrameOutput),
     intake: &Intake,
 ) -> Result<FrameSink, LiveError> {
     // No other run's frames are these.
@@ -103,7 +109,7 @@ fn open_sink(
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     format!("{now:?}").add_to(&mut hash);
     Ok(FrameSink::open(SinkPlan {
-        path: &options.output,
+        path,
         output,
         layers: ExrLayers::new(&[], Composite::Additive),
         objects: Vec::new(),
@@ -118,7 +124,7 @@ fn open_sink(
 
 struct Live<'a> {
     options: &'a LiveOptions,
-    output: FrameOutput,
+    film: Option<(&'a Path, FrameOutput)>,
     known: KnownBoard,
     intrinsics: Option<Intrinsics>,
     begin: Instant,
@@ -160,12 +166,50 @@ struct Running {
 }
 
 impl Live<'_> {
-    fn sink(&mut self) -> Result<&mut FrameSink, LiveError> {
+    /// `None`: nothing is written.
+    fn sink(&mut self) -> Result<Option<&mut FrameSink>, LiveError> {
+        let Some(film) = &self.film else {
+            return Ok(None);
+        };
         let sink = match self.sink.take() {
             Some(sink) => sink,
-            None => open_sink(self.options, self.output.clone(), &self.intake)?,
+            None => open_sink(self.options, film.clone(), &self.intake)?,
         };
-        Ok(self.sink.insert(sink))
+        Ok(Some(self.sink.insert(sink)))
+    }
+
+    /// The photograph goes out as it came.
+    fn pass(&mut self, name: &FrameName, frame: &VideoFrame) -> Result<(), LiveError> {
+        if let Some(sink) = self.sink()? {
+            sink.pass(name, frame)?;
+        }
+        if let (true, EncodedPhoto::Codes8(codes)) = (self.options.shows, &frame.photo.encoded) {
+            self.show(&frame.photo, codes.clone());
+        }
+        Ok(())
+    }
+
+    fn write(
+        &mut self,
+        name: &FrameName,
+        picture: &Picture,
+        frame: &VideoFrame,
+    ) -> Result<(), LiveError> {
+        if let Some(sink) = self.sink()? {
+            sink.write(name, picture, frame)?;
+        }
+        if self.options.shows {
+            self.show(&frame.photo, picture_codes8(picture, Some(&frame.photo)));
+        }
+        Ok(())
+    }
+
+    fn show(&self, photo: &Photo, codes: Vec<[u8; 3]>) {
+        (self.hear)(&LiveEvent::Frame(&LiveFrame {
+            width: photo.width,
+            height: photo.height,
+            codes,
+        }));
     }
 
     fn take(&mut self, arrived: Arrived) -> Result<(), LiveError> {
@@ -174,6 +218,7 @@ impl Live<'_> {
         let mut seconds = LiveSeconds::default();
         let mut clock = Clock::start();
         let header = &self.intake.header;
+        let luma = Luma::of_planes(header, &planes);
         let codes = decode_yuv(header, &planes);
         let photo = Photo::from_srgb8(header.width, header.height, codes);
         seconds.decode = clock.lap();
@@ -182,15 +227,15 @@ impl Live<'_> {
             None => self.start(&photo)?,
         };
         clock.lap();
-        let found = started.follower.follow(&Luma::of(&photo));
+        let found = started.follower.follow(&luma);
         let pose = found.map_err(|why| self.tally.lacks_pose(why)).ok();
         let pose = pose.map(|pose| pose.world_from_camera());
         let placed = self.held.place(pose, at.duration_since(self.begin));
         seconds.track = clock.lap();
         if self.options.keep_time {
             let last = started.number.map_or(number, |last| last + 1);
-            for _ in last..number {
-                self.sink()?.stand_in(&name)?;
+            if let Some(sink) = self.sink()? {
+                (last..number).try_for_each(|_| sink.stand_in(&name))?;
             }
         }
         started.number = Some(number);
@@ -202,7 +247,7 @@ impl Live<'_> {
         let became = match placed.world_from_camera() {
             None => {
                 started.before = None;
-                self.sink()?.pass(&name, &frame)?;
+                self.pass(&name, &frame)?;
                 Became::PassedThrough
             }
             Some(world_from_camera) => {
@@ -216,7 +261,7 @@ impl Live<'_> {
                     &mut seconds,
                 )?;
                 clock.lap();
-                self.sink()?.write(&name, &picture, &frame)?;
+                self.write(&name, &picture, &frame)?;
                 seconds.write = clock.lap();
                 // The first frame also waited for the scene's trees.
                 if !is_first {
@@ -276,7 +321,7 @@ impl Live<'_> {
         photo: &Photo,
         number: u32,
         seconds: &mut LiveSeconds,
-    ) -> Result<crate::film::Picture, LiveError> {
+    ) -> Result<Picture, LiveError> {
         let camera = Camera {
             world_from_camera,
             ..started.camera.clone()
@@ -318,7 +363,7 @@ impl Live<'_> {
         let rays = Budget::Rays(pixels * u64::from(self.budget.rays()));
         renderer.advance(rays, &Watcher::none())?;
         seconds.render = clock.lap();
-        let picture = renderer.delivered().picture;
+        let picture = renderer.delivered_picture();
         seconds.composite = clock.lap();
         let wants_motion = (renderer.scene().stages.motion_blur)
             .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);

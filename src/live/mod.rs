@@ -33,8 +33,10 @@ pub struct LiveOptions {
     pub overrides: Overrides,
     /// Y4M file or pipe, or `-` for standard input.
     pub input: PathBuf,
-    /// A `.y4m` file, or `-` for standard output.
-    pub output: PathBuf,
+    /// A `.y4m` file, or `-` for standard output; `None`: frames are only heard of.
+    pub output: Option<PathBuf>,
+    /// Each frame that is done is heard of.
+    pub shows: bool,
     /// Board file, or the report of a tracked video.
     pub board: PathBuf,
     /// Where the board does not tell it; `None`: whichever is found.
@@ -69,6 +71,17 @@ pub enum LiveEvent<'a> {
     Note(&'a str),
     /// What happened since the last one.
     Summary(&'a LiveWindow),
+    /// A frame is done; only where [`LiveOptions::shows`] asks for it.
+    Frame(&'a LiveFrame),
+}
+
+/// A frame as it goes out.
+#[derive(Clone, Debug)]
+pub struct LiveFrame {
+    pub width: u32,
+    pub height: u32,
+    /// sRGB, row-major from the top left.
+    pub codes: Vec<[u8; 3]>,
 }
 
 /// Why a stream cannot be augmented, in one line. What is written stays.

@@ -86,8 +86,10 @@ pub struct LiveWindow {
     pub wait: AgeSpread,
     /// Of rendered frames, mean.
     pub rays_per_pixel: f64,
-    /// Of processing, without waiting: mean of a frame.
+    /// Of processing, without waiting: mean of a frame, ...
     pub work_ms: f64,
+    /// ... and how frames differ in it.
+    pub work: AgeSpread,
     /// Why frames had no pose of their own.
     pub without_pose: BTreeMap<String, u64>,
 }
@@ -168,6 +170,7 @@ pub(super) struct Tally {
 struct Sums {
     ages: Ages,
     waits: Ages,
+    works: Ages,
     rays_per_pixel: u64,
     work_secs: f64,
     without_pose: BTreeMap<String, u64>,
@@ -183,6 +186,7 @@ impl Sums {
             wait: self.waits.spread(),
             rays_per_pixel: self.rays_per_pixel as f64 / rendered,
             work_ms: 1e3 * self.work_secs / self.ages.len().max(1) as f64,
+            work: self.works.spread(),
             without_pose: self.without_pose.clone(),
         }
     }
@@ -190,6 +194,7 @@ impl Sums {
     fn extend(&mut self, other: &Self) {
         self.ages.extend(&other.ages);
         self.waits.extend(&other.waits);
+        self.works.extend(&other.works);
         self.rays_per_pixel += other.rays_per_pixel;
         self.work_secs += other.work_secs;
         for (why, count) in &other.without_pose {
@@ -229,6 +234,7 @@ impl Tally {
         self.window.rays_per_pixel += u64::from(rays_per_pixel);
         self.window.ages.add(age_secs);
         self.window.waits.add(age_secs - seconds.total());
+        self.window.works.add(seconds.total());
         self.window.work_secs += seconds.total();
         self.seconds.add(seconds);
     }

@@ -6,8 +6,8 @@ use super::core::Core;
 use super::{Filter, Renderer};
 use crate::cpu::estimator::evaluations_before;
 use crate::film::{
-    Combined, Film, GROUPS, Picture, Planes, combine_robustly, composite, estimated_error,
-    filter_difference, filter_finally, group_counts, planes,
+    Combined, Film, GROUPS, Picture, Planes, combine_robustly, composite, composite_smoothed,
+    estimated_error, filter_difference, filter_finally, group_counts, planes, smoothed_difference,
 };
 use crate::scene::Composite;
 
@@ -33,7 +33,16 @@ impl Renderer {
 
     /// The film composited over the photograph: means of the samples.
     pub fn picture(&self) -> Picture {
-        self.composited(&self.shown())
+        let Core { film, scene, .. } = &self.core;
+        match self.core.options.filter {
+            Some(Filter::Preview) => composite_smoothed(
+                film,
+                &smoothed_difference(film, &self.surfaces),
+                scene.photo.as_ref(),
+                scene.settings.composite,
+            ),
+            Some(Filter::Final) | None => self.composited(film),
+        }
     }
 
     /// The picture as it is delivered: with the scene's combination of samples, or filtered.
@@ -60,6 +69,14 @@ impl Renderer {
             picture: self.composited(&film),
             film,
             moved,
+        }
+    }
+
+    /// Its picture alone, which spares a copy of the film.
+    pub fn delivered_picture(&self) -> Picture {
+        match self.core.options.filter {
+            Some(Filter::Preview) => self.picture(),
+            Some(Filter::Final) | None => self.delivered().picture,
         }
     }
 

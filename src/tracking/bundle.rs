@@ -197,6 +197,17 @@ impl Problem<'_> {
         block
     }
 
+    /// Share of the corners' errors that is left once all has been fitted to them: of a single marker in each frame, whose pose takes six of its eight
+    /// coordinates, a quarter at the most.
+    fn redundancy(&self) -> f64 {
+        let seen: usize = self.views.iter().map(|view| view.observations.len()).sum();
+        let lens = self.free_lens.iter().filter(|free| **free).count();
+        // Points that are free have a prior for each coordinate, and take little.
+        let fitted = 6 * self.views.len() + lens;
+        let coordinates = 2 * seen;
+        coordinates.saturating_sub(fitted).max(1) as f64 / coordinates.max(1) as f64
+    }
+
     /// Absolute errors along both axes, ascending.
     fn sorted_errors(&self) -> Vec<f64> {
         let all = self.views.iter().flat_map(|view| {
@@ -220,7 +231,8 @@ impl Problem<'_> {
             let errors = self.sorted_errors();
             let before = self.noise_px;
             // 1.4826 medians are a standard deviation; corners are never better than a thousandth of a pixel.
-            self.noise_px = (1.4826 * errors.get(errors.len() / 2)?).max(1e-3);
+            let left = 1.4826 * errors.get(errors.len() / 2)?;
+            self.noise_px = (left / self.redundancy().sqrt()).max(1e-3);
             if (self.noise_px / before - 1.0).abs() < 0.02 {
                 break;
             }
@@ -434,3 +446,6 @@ impl Solution {
         Some(covariance)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -140,6 +140,17 @@ impl Sides {
         self
     }
 
+    /// Each point moved; `to` hears of its side, from 0.
+    pub fn moved(&self, to: impl Fn(usize, DVec2) -> DVec2) -> Self {
+        let mut sides = self.0.clone();
+        for (side, points) in sides.iter_mut().enumerate() {
+            points
+                .iter_mut()
+                .for_each(|point| *point = to(side, *point));
+        }
+        Self(sides)
+    }
+
     /// Corners of the lines that are straight without the lens, as pixels of the photograph.
     pub fn corners(&self, lens: &Lens) -> Option<Quad> {
         let mut lines = Vec::with_capacity(4);

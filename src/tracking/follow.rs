@@ -107,6 +107,7 @@ impl Follower {
             fix_lens: true,
             tone: self.known.tone,
             flatness: Flatness::RIGID,
+            readout: None,
         };
         let (detector, _) = prepare(&options, std::slice::from_ref(luma))
             .map_err(|_| "no family of markers is recognised yet".to_owned())?;

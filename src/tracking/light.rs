@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use crate::scene::{EncodedPhoto, Photo};
+use crate::video::{Header, luma_codes};
 
 /// Brightness of a frame as its file encodes it, row-major from the top left.
 #[derive(Clone, Debug)]
@@ -13,6 +14,15 @@ pub struct Luma {
 }
 
 impl Luma {
+    /// Of a Y4M stream's frame, without its colours.
+    pub fn of_planes(header: &Header, planes: &[u8]) -> Self {
+        Self {
+            width: header.width as usize,
+            height: header.height as usize,
+            codes: luma_codes(header, planes),
+        }
+    }
+
     /// Weights of BT.601; linear pictures are encoded as sRGB.
     pub fn of(photo: &Photo) -> Self {
         let code = |[r, g, b]: [f32; 3]| (0.299 * r + 0.587 * g + 0.114 * b + 0.5) as u8;

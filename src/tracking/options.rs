@@ -19,6 +19,17 @@ pub struct TrackOptions {
     /// `None`: estimated.
     pub tone: Option<Tone>,
     pub flatness: Flatness,
+    /// `None`: all rows are of one time.
+    pub readout: Option<Readout>,
+}
+
+/// What is known of the time that a sensor takes from its first row to its last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Readout {
+    /// Seconds; below 0: from the lowest row up.
+    Known(f64),
+    /// The one with which corners fit best.
+    Solve,
 }
 
 /// What the camera's poses refer to.

@@ -136,6 +136,10 @@ impl Session {
                 },
             })),
             "learnt_from_frames": tracked.learnt_from,
+            "rows": self.rows.as_ref().map(|rows| json!({
+                "readout_secs": rows.readout_secs, "sigma_secs": rows.sigma_secs,
+                "frames_as_they_came": rows.frames_as_they_came,
+            })),
             "camera": self.camera(),
             "camera_sigma": lens_sigmas(solution),
             "board": {
@@ -200,6 +204,7 @@ impl Session {
             solution.noise_px,
             tracked.tone
         ));
+        lines.extend(self.rows_text());
         lines.extend(self.moved_text());
         let mut reasons = std::collections::BTreeMap::<&str, usize>::new();
         for why in tracked
@@ -219,6 +224,19 @@ impl Session {
 }
 
 impl Session {
+    /// How rows were read, in one line.
+    fn rows_text(&self) -> Option<String> {
+        let rows = self.rows.as_ref()?;
+        let sigma = rows
+            .sigma_secs
+            .map_or(String::new(), |sigma| format!(" +- {:.2}", 1e3 * sigma));
+        Some(format!(
+            "rows:    read in {:.2}{sigma} ms; poses and corners are those of the middle row's time; {} frames, whose motion no neighbour tells, stand as they came",
+            1e3 * rows.readout_secs,
+            rows.frames_as_they_came
+        ))
+    }
+
     /// What was smoothed, in one line.
     fn moved_text(&self) -> Option<String> {
         let moved = self.moved.iter().zip(&self.names);

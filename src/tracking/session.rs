@@ -7,12 +7,13 @@ use rayon::prelude::*;
 use super::TrackError;
 use super::detector::FrameSeen;
 use super::half_turn::keep_turn;
-use super::learning::learn_from;
 use super::light::Luma;
 use super::options::TrackOptions;
 use super::pose::Moved;
 use super::prepare::prepare;
-use super::tracker::{Tracked, pose_all};
+use super::rolling::{Rows, solve_rows};
+use super::solved::{Solved, solve};
+use super::tracker::Tracked;
 use crate::scene::trajectory::FrameName;
 use crate::video::{FrameSource, Taken};
 
@@ -28,6 +29,8 @@ pub struct Session {
     /// One for each of the frames.
     pub names: Vec<FrameName>,
     pub frames_per_second: Option<f64>,
+    /// `None`: all rows were taken to be of one time.
+    pub rows: Option<Rows>,
     /// How far [`Session::smooth`] moved each pose; empty: nothing was smoothed.
     pub moved: Vec<Option<Moved>>,
 }
@@ -40,7 +43,7 @@ enum Picture {
 /// Tracks what [`FrameSource`] reads; `progress` hears the number of frames looked at.
 ///
 /// # Errors
-/// Nothing can be read, or [`prepare`] and [`learn_from`] refuse.
+/// Nothing can be read, or [`prepare`] or the frames refuse.
 pub fn track(
     path: &Path,
     options: &TrackOptions,
@@ -91,8 +94,20 @@ pub fn track(
     if let Some((columns, rows)) = detector.chessboard {
         keep_turn(&mut seen, columns * rows);
     }
-    let (board, solution, learnt_from) = learn_from(options, &seen, (width, height))?;
-    let frames = pose_all(&seen, &board, &solution);
+    let size = (width, height);
+    let (solved, rows) = match options.readout {
+        None => (solve(options, &seen, size)?, None),
+        Some(readout) => {
+            let (solved, rows) = solve_rows(options, &seen, size, frames_per_second, readout)?;
+            (solved, Some(rows))
+        }
+    };
+    let Solved {
+        board,
+        solution,
+        learnt_from,
+        frames,
+    } = solved;
     let tracked = Tracked {
         width,
         height,
@@ -112,6 +127,7 @@ pub fn track(
         tracked,
         names,
         frames_per_second,
+        rows,
         moved: Vec::new(),
     })
 }
@@ -139,16 +155,20 @@ fn next(
     size: &mut Option<(usize, usize)>,
     names: &mut Vec<FrameName>,
 ) -> Result<Option<Picture>, TrackError> {
-    let Some((name, taken)) = source.next(&|_| true)? else {
+    let taken = source.next_as(
+        &|_| true,
+        |header, planes| Luma::of_planes(header, &planes),
+        |frame| Luma::of(&frame.photo),
+    );
+    let Some((name, taken)) = taken? else {
         return Ok(None);
     };
     names.push(name);
-    let frame = match taken {
-        Taken::Whole(frame) => frame,
+    let luma = match taken {
+        Taken::Whole(luma) => luma,
         Taken::Damaged { problem, .. } => return Ok(Some(Picture::Lost(problem.to_string()))),
         Taken::Skipped => return Ok(Some(Picture::Lost("it was passed over".to_owned()))),
     };
-    let luma = Luma::of(&frame.photo);
     let own = (luma.width, luma.height);
     let first = *size.get_or_insert(own);
     Ok(Some(match own == first {

@@ -13,7 +13,7 @@ pub use matrix::Matrix;
 pub use sink::{FrameSink, SinkPlan, sequence_note};
 pub use source::{FrameRange, FrameSource, Pixels, Taken, VideoFrame};
 pub use y4m::{Chroma, Header, Y4mReader};
-pub use yuv::{decode_yuv, encode_yuv};
+pub use yuv::{decode_yuv, encode_yuv, luma_codes};
 
 use std::path::{Path, PathBuf};
 

@@ -42,16 +42,29 @@ pub struct VideoFrame {
 
 /// What [`FrameSource::next`] finds.
 #[derive(Debug)]
-pub enum Taken {
+pub enum Taken<T = VideoFrame> {
     /// Not wanted.
     Skipped,
-    Whole(VideoFrame),
+    Whole(T),
     /// The frame after it is found all the same.
     Damaged {
         problem: VideoError,
         /// What there is of it, if anything can be decoded.
-        rest: Option<VideoFrame>,
+        rest: Option<T>,
     },
+}
+
+impl Taken {
+    fn map<T>(self, of_frame: impl Fn(VideoFrame) -> T) -> Taken<T> {
+        match self {
+            Self::Skipped => Taken::Skipped,
+            Self::Whole(frame) => Taken::Whole(of_frame(frame)),
+            Self::Damaged { problem, rest } => Taken::Damaged {
+                problem,
+                rest: rest.map(of_frame),
+            },
+        }
+    }
 }
 
 /// Frames in their order.
@@ -151,12 +164,33 @@ impl FrameSource {
         &mut self,
         wanted: &dyn Fn(&FrameName) -> bool,
     ) -> Result<Option<(FrameName, Taken)>, VideoError> {
+        let of_planes = |header: &Header, planes: Vec<u8>| {
+            let codes = decode_yuv(header, &planes);
+            VideoFrame {
+                photo: Photo::from_srgb8(header.width, header.height, codes),
+                pixels: Pixels::Planes(planes),
+                warnings: Vec::new(),
+            }
+        };
+        self.next_as(wanted, of_planes, |frame| frame)
+    }
+
+    /// The same, for who needs no colours: of the planes of a Y4M stream, or of a photograph.
+    ///
+    /// # Errors
+    /// Nothing more can be read.
+    pub fn next_as<T>(
+        &mut self,
+        wanted: &dyn Fn(&FrameName) -> bool,
+        of_planes: impl Fn(&Header, Vec<u8>) -> T,
+        of_frame: impl Fn(VideoFrame) -> T,
+    ) -> Result<Option<(FrameName, Taken<T>)>, VideoError> {
         let index = self.next;
         self.next += 1;
         match &mut self.kind {
             Kind::Folder(files) => Ok(files.get(index as usize).map(|(name, path)| {
                 let taken = match wanted(name) {
-                    true => take_picture(path),
+                    true => take_picture(path).map(of_frame),
                     false => Taken::Skipped,
                 };
                 (name.clone(), taken)
@@ -168,43 +202,23 @@ impl FrameSource {
             } => Ok(frames.get(index as usize).map(|range| {
                 let name = FrameName::of_stream(index, &place.to_string());
                 let taken = match wanted(&name) {
-                    true => take_jpeg(&bytes[range.clone()], index, place),
+                    true => take_jpeg(&bytes[range.clone()], index, place).map(of_frame),
                     false => Taken::Skipped,
                 };
                 (name, taken)
             })),
             Kind::Y4m(reader) => {
-                let Some(frame) = reader.next_frame()? else {
+                let Some(Planes { planes, problem }) = reader.next_frame()? else {
                     return Ok(None);
                 };
                 let name = FrameName::of_stream(index, &reader.place().to_string());
-                let of_planes = |planes: Vec<u8>| {
-                    let header = reader.header();
-                    let codes = decode_yuv(header, &planes);
-                    VideoFrame {
-                        photo: Photo::from_srgb8(header.width, header.height, codes),
-                        pixels: Pixels::Planes(planes),
-                        warnings: Vec::new(),
-                    }
-                };
-                let taken = match (wanted(&name), frame) {
+                let decoded = |planes| of_planes(reader.header(), planes);
+                let taken = match (wanted(&name), problem) {
                     (false, _) => Taken::Skipped,
-                    (
-                        true,
-                        Planes {
-                            planes,
-                            problem: None,
-                        },
-                    ) => Taken::Whole(of_planes(planes)),
-                    (
-                        true,
-                        Planes {
-                            planes,
-                            problem: Some(problem),
-                        },
-                    ) => Taken::Damaged {
+                    (true, None) => Taken::Whole(decoded(planes)),
+                    (true, Some(problem)) => Taken::Damaged {
                         problem,
-                        rest: Some(of_planes(planes)),
+                        rest: Some(decoded(planes)),
                     },
                 };
                 Ok(Some((name, taken)))

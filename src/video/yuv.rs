@@ -90,7 +90,7 @@ fn table(of: impl Fn(f64) -> f64) -> [f64; 256] {
 }
 
 fn code(x: f64) -> u8 {
-    x.round().clamp(0.0, 255.0) as u8
+    (x.clamp(0.0, 255.0) + 0.5) as u8
 }
 
 /// The planes of a frame as encoded RGB, row-major.
@@ -110,6 +110,17 @@ pub fn decode_yuv(header: &Header, planes: &[u8]) -> Vec<[u8; 3]> {
         }
     }
     rgb
+}
+
+/// Brightness of a frame's pixels as codes of full range, row-major: what [`decode_yuv`] makes of them without their colours.
+pub fn luma_codes(header: &Header, planes: &[u8]) -> Vec<u8> {
+    let luma = Range::of(header).decoder().luma;
+    let codes = luma.map(|x| code(255.0 * x));
+    let pixels = header.width as usize * header.height as usize;
+    planes[..pixels]
+        .iter()
+        .map(|luma| codes[usize::from(*luma)])
+        .collect()
 }
 
 /// The planes of encoded RGB. Pixels that equal `before`'s, a frame of the same stream in both forms, keep its samples.
@@ -212,6 +223,30 @@ mod tests {
             (tall.matrix, header_of("420", "").matrix),
             (Matrix::Bt709, Matrix::Bt601)
         );
+    }
+
+    /// Control: colours have another brightness in green alone.
+    #[test]
+    fn brightness_is_that_of_the_decoded_pixels() {
+        for more in ["", "XCOLORRANGE=FULL"] {
+            let header = header_of("444", more);
+            let range = Range::of(&header);
+            let rgb = [[0, 0, 0], [255; 3], [120, 60, 200], [200, 190, 30]];
+            let mut planes = vec![128; header.frame_bytes()];
+            for (pixel, rgb) in rgb.into_iter().enumerate() {
+                let samples = range.encode(rgb).map(code);
+                for (plane, sample) in samples.into_iter().enumerate() {
+                    planes[24 * plane + pixel] = sample;
+                }
+            }
+            let luma = luma_codes(&header, &planes);
+            for (own, [r, g, b]) in luma.into_iter().zip(rgb) {
+                let exact = 0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b);
+                assert!((f64::from(own) - exact).abs() < 1.1, "{own} {exact}");
+                let is_grey = r == g;
+                assert!(is_grey || (exact - f64::from(g)).abs() > 2.0, "control");
+            }
+        }
     }
 
     #[test]

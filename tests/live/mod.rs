@@ -26,7 +26,7 @@ size = [0.04, 0.04, 0.04]
 translation = [0.0, 0.0201, 0.0]
 ";
 
-const LIVE: &str = "live scene.toml --board board.toml --gamma 2.2 --backend cpu --rpp 2";
+pub const LIVE: &str = "live scene.toml --board board.toml --gamma 2.2 --backend cpu --rpp 2";
 
 /// Five views, the marker out of sight in the fourth.
 fn film() -> Film {
@@ -41,7 +41,7 @@ fn film() -> Film {
 }
 
 /// The scene, the board, and the film as the stream's bytes.
-fn prepared() -> (Folder, Vec<u8>) {
+pub fn prepared() -> (Folder, Vec<u8>) {
     let folder = Folder::new();
     folder.write("board.toml", BOARD);
     folder.write("scene.toml", SCENE);
@@ -52,7 +52,7 @@ fn prepared() -> (Folder, Vec<u8>) {
 }
 
 /// The header with its end, and the frames with their markers.
-fn parts(stream: &[u8]) -> (&[u8], Vec<&[u8]>) {
+pub fn parts(stream: &[u8]) -> (&[u8], Vec<&[u8]>) {
     let header = 1 + stream.iter().position(|byte| *byte == b'\n').unwrap();
     let planes = 480 * 360 * 3 / 2;
     let frames = stream[header..].chunks(b"FRAME\n".len() + planes);

@@ -1,7 +1,7 @@
 //! The real window, on a display of its own: Xvfb, and xdotool at the mouse and the keys. Both are in `.ci/run`'s packages; without them nothing
 //! is tested, and said so.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -11,6 +11,7 @@ use mixray::preview::document::Document;
 use mixray::scene::load;
 
 use super::{demo, window};
+use crate::live::{LIVE, parts, prepared};
 use crate::support::Folder;
 
 /// Nothing that is waited for takes longer.
@@ -190,4 +191,72 @@ fn a_shot_is_composed_in_the_real_window() {
     // Undo brings back what was, to the letter.
     display.hand(&["key", "ctrl+z"]);
     soon(&display, &folder, |text| text == focused);
+}
+
+/// The newest frames of a stream in a window, until Esc. Control: until then the program goes on.
+#[test]
+fn a_running_stream_is_shown_in_a_window_until_escape() {
+    let Some(display) = Display::open() else {
+        return;
+    };
+    let (folder, stream) = prepared();
+    let mut program = folder.command(&format!("{LIVE} --window --summary 0.5 --stats stats.json"));
+    let program = program
+        .env("DISPLAY", &display.name)
+        .env_remove("WAYLAND_DISPLAY")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn();
+    let mut program = Running(program.unwrap());
+    let mut to = program.0.stdin.take().unwrap();
+    let feeding = std::thread::spawn(move || {
+        let (header, frames) = parts(&stream);
+        let mut sent = to.write_all(header);
+        // Until the program closes its end.
+        for frame in frames.into_iter().cycle() {
+            if sent.is_err() {
+                return;
+            }
+            sent = to.write_all(frame);
+            sleep(PAUSE);
+        }
+    });
+    let mut said = BufReader::new(program.0.stderr.take().unwrap()).lines();
+    let goes = said.any(|line| {
+        let line = line.unwrap();
+        line.starts_with("live: ") && !line.starts_with("live: 0.0 of")
+    });
+    assert!(goes, "no frame goes out");
+    let end = Instant::now() + PATIENCE;
+    let shown = loop {
+        let found = display.hand(&["search", "--onlyvisible", "--name", "mixray live"]);
+        if let Some(id) = found.lines().last() {
+            break id.to_owned();
+        }
+        assert!(Instant::now() < end, "no window appears");
+        sleep(PAUSE);
+    };
+    display.hand(&["windowfocus", &shown]);
+    sleep(PAUSE);
+    assert_eq!(program.0.try_wait().unwrap(), None, "control");
+    let status = loop {
+        display.hand(&["key", "Escape"]);
+        sleep(PAUSE);
+        if let Some(status) = program.0.try_wait().unwrap() {
+            break status;
+        }
+        assert!(Instant::now() < end, "the window stays");
+    };
+    assert_eq!(status.code(), Some(0));
+    feeding.join().unwrap();
+    let frames = folder.json("stats.json")["total"]["frames"].clone();
+    assert!(frames["rendered"].as_u64().unwrap() > 0, "{frames}");
+    let mut written = Vec::new();
+    let out = program.0.stdout.take().unwrap();
+    BufReader::new(out).read_to_end(&mut written).unwrap();
+    assert!(
+        written.is_empty(),
+        "a stream that is shown is not written as well"
+    );
 }

@@ -4,7 +4,7 @@ use glam::{DMat4, DVec2, DVec3};
 use mixray::tracking::Family;
 use serde_json::Value;
 
-use super::film::{Film, View, looking, markers};
+use super::film::{Film, INK, View, looking, markers, squares};
 use crate::support::{Folder, stderr};
 
 const BOARD: &str =
@@ -228,6 +228,56 @@ fn streams_that_break_off_or_are_noise_end_without_a_panic() {
         "track noise.y4m --marker-size 40mm -o poses.json",
         "expected black squares",
     );
+    let smaller = String::from_utf8_lossy(&whole[..header]).replace("W480", "W240");
+    let (first, second) = whole[header..].split_at(frame);
+    let changed = [&whole[..header], first, smaller.as_bytes(), second].concat();
+    folder.write("changed.y4m", changed);
+    folder.refuse(
+        "track changed.y4m --marker-size 40mm -o poses.json",
+        "expected frames of one size",
+    );
+    // Damaged anywhere, header and frames' marks included.
+    for _ in 0..12 {
+        let mut damaged = whole.clone();
+        for _ in 0..4 {
+            let at = random.bits() as usize % damaged.len();
+            let near = match random.bits() % 3 {
+                0 => at % header,
+                1 => header + at / frame % 3 * frame + at % 6,
+                _ => at,
+            };
+            let end = damaged.len().min(near + 1 + random.bits() as usize % 9);
+            damaged[near..end].fill_with(|| random.bits() as u8);
+        }
+        folder.write("damaged.y4m", damaged);
+        let output = folder.run("track damaged.y4m --marker-size 40mm --gamma 2.2 -o poses.json");
+        let said = stderr(&output);
+        assert!(
+            matches!(output.status.code(), Some(0 | 2)) && !said.contains("panicked"),
+            "{said}"
+        );
+    }
+}
+
+/// A screen full of dark squares without a code: no pose is invented, whichever families are tried.
+#[test]
+fn squares_that_are_no_markers_have_no_pose() {
+    let folder = Folder::new();
+    let mut film = Film::around();
+    film.views.truncate(3);
+    film.save(
+        &folder,
+        "film.y4m",
+        &squares((7, 5), (0.03, 0.01), |_, _| INK),
+    );
+    folder.write("board.toml", BOARD);
+    for target in ["--marker-size 30mm", "--board board.toml"] {
+        folder.refuse(
+            &format!("track film.y4m {target} -o poses.json"),
+            "expected",
+        );
+        assert!(!folder.path("poses.json").exists());
+    }
 }
 
 #[test]

@@ -60,6 +60,19 @@ impl Film {
 
     /// As Y4M of luma alone.
     pub fn save(&self, folder: &Folder, name: &str, print: Print) {
+        let still = |frame: usize, _: f64| self.views[frame];
+        self.save_rows(folder, name, print, self.views.len(), &still);
+    }
+
+    /// The same, each row from where the camera then is: `view_of` gets the frame's number and the row's place, from -0.5, the first, to 0.5, the last.
+    pub fn save_rows(
+        &self,
+        folder: &Folder,
+        name: &str,
+        print: Print,
+        frames: usize,
+        view_of: &dyn Fn(usize, f64) -> View,
+    ) {
         const SIDE: usize = 3;
         let across = SIDE * self.width;
         let mut rays = Vec::with_capacity(across * SIDE * self.height);
@@ -84,12 +97,13 @@ impl Film {
             self.width, self.height
         );
         let mut bytes = header.into_bytes();
-        for view in &self.views {
+        for frame in 0..frames {
             bytes.extend(b"FRAME\n");
-            let back = view.rotation.transpose();
-            let eye = -(back * view.translation);
             let mut lights = Vec::with_capacity(self.width * self.height);
             for row in 0..self.height {
+                let view = view_of(frame, row as f64 / (self.height as f64 - 1.0) - 0.5);
+                let back = view.rotation.transpose();
+                let eye = -(back * view.translation);
                 for column in 0..self.width {
                     let mut light = 0.0;
                     for j in 0..SIDE {

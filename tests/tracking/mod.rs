@@ -5,5 +5,6 @@ mod commands;
 pub mod film;
 mod patterns;
 mod photographs;
+mod rolling;
 mod scale;
 mod videos;

@@ -48,6 +48,7 @@ fn no_marker_is_invented() {
     }
     assert!(lumas.len() >= 200, "{}", lumas.len());
     let options = TrackOptions {
+        readout: None,
         target: Target::Markers { side_m: 0.04 },
         code: None,
         lens: None,

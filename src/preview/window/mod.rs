@@ -4,6 +4,7 @@ mod canvas;
 mod file_list;
 mod keys;
 mod panel;
+mod stream;
 mod timeline;
 
 use std::path::{Path, PathBuf};
@@ -21,6 +22,7 @@ use super::still::StillState;
 use canvas::Canvas;
 use file_list::FileList;
 use keys::Act;
+pub use stream::{StreamApp, StreamFeed, show_stream};
 use timeline::Timeline;
 
 /// A third of a stop, as a factor of the f-number.
@@ -333,7 +335,7 @@ impl eframe::App for App {
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
     #[error(
-        "the window cannot be opened: {0}; expected a display and a graphics driver (on Linux Vulkan, such as Mesa's); or use --headless-script"
+        "the window cannot be opened: {0}; expected a display and a graphics driver (on Linux Vulkan, such as Mesa's); or use --headless-script, or of a stream its output"
     )]
     Open(String),
     #[error("threads cannot be started: {0}")]
@@ -345,17 +347,11 @@ pub enum WindowError {
 /// # Errors
 /// There is no display, no graphics driver, or no threads.
 pub fn run(scene: &Path, frames: Option<Frames>, frame_time: Duration) -> Result<(), WindowError> {
-    let options = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            .with_inner_size([1240.0, 760.0])
-            .with_drag_and_drop(true),
-        renderer: eframe::Renderer::Wgpu,
-        ..eframe::NativeOptions::default()
-    };
     let scene = scene.to_path_buf();
-    eframe::run_native(
-        &format!("mixray preview {}", scene.display()),
-        options,
+    let title = format!("mixray preview {}", scene.display());
+    open(
+        &title,
+        [1240.0, 760.0],
         Box::new(move |creation| {
             let context = creation.egui_ctx.clone();
             let mut session = Session::open(&scene, frame_time, move || context.request_repaint())?;
@@ -365,5 +361,20 @@ pub fn run(scene: &Path, frames: Option<Frames>, frame_time: Duration) -> Result
             Ok(Box::new(App::new(session)))
         }),
     )
-    .map_err(|error| WindowError::Open(error.to_string()))
+}
+
+/// A window of this size in points.
+fn open(
+    title: &str,
+    size: [f32; 2],
+    create: eframe::AppCreator<'static>,
+) -> Result<(), WindowError> {
+    let options = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_inner_size(size)
+            .with_drag_and_drop(true),
+        renderer: eframe::Renderer::Wgpu,
+        ..eframe::NativeOptions::default()
+    };
+    eframe::run_native(title, options, create).map_err(|error| WindowError::Open(error.to_string()))
 }
