@@ -34,6 +34,13 @@ shared! {
     }
 }
 
+/// The answer where only that something was met means anything.
+const MET: Hit = Hit {
+    t: 0.0,
+    triangle: 0,
+    ..MISS
+};
+
 #[inline]
 fn query(world: u32, any_hit: bool, t_max: f32, is_last: bool) -> Query {
     Query {
@@ -139,10 +146,12 @@ fn answer_past<const PAST: bool>(
 ) {
     let request = st.ray.request;
     let (alpha, panes) = (PAST && alpha, PAST && panes);
-    let mut hits = Hits {
-        in_real: MISS,
-        in_virtual: MISS,
-    };
+    // In place: copies of what was just stored in other widths wait for the stores.
+    st.hits.in_real = MISS;
+    if request != REQUEST_CLOSEST_REAL {
+        // It answers beside the virtual hit found before.
+        st.hits.in_virtual = MISS;
+    }
     let mut step = 0;
     let mut layer = 0;
     let mut t_min = -1.0;
@@ -150,7 +159,7 @@ fn answer_past<const PAST: bool>(
     let mut passed = passage();
     // Transparent layers and panes repeat a query from where it stopped.
     loop {
-        let q = next_query(scene, request, step, st.ray.t_max, &hits);
+        let q = next_query(scene, request, step, st.ray.t_max, &st.hits);
         if q.world == QUERY_NONE {
             break;
         }
@@ -177,29 +186,23 @@ fn answer_past<const PAST: bool>(
             }
         }
         layer = 0;
-        if q.any_hit && hit.triangle != NONE {
-            // Only that something was met means anything.
-            hit.t = 0.0;
+        if PAST && q.any_hit && hit.triangle != NONE {
+            hit = MET;
         }
         if panes {
             hit = shadow_answer(scene, passed, hit, ray.t_max);
             passed = passage();
         }
         if q.to_real {
-            hits.in_real = hit;
+            st.hits.in_real = hit;
         } else if q.world == SIDE_VIRTUAL || blocks(hit) {
-            hits.in_virtual = hit;
+            st.hits.in_virtual = hit;
         }
         if q.is_last {
             break;
         }
         step += 1;
     }
-    if request == REQUEST_CLOSEST_REAL {
-        // It answers beside the virtual hit found before.
-        hits.in_virtual = st.hits.in_virtual;
-    }
-    st.hits = hits;
     count_rays(scene, st);
 }
 
@@ -214,10 +217,7 @@ fn trace(scene: &PackedScene, ray: &Ray, world: u32, any_hit: bool) -> Hit {
     if !any_hit {
         return bvh.closest(ray);
     }
-    Hit {
-        triangle: if bvh.any(ray) { 0 } else { NONE },
-        ..MISS
-    }
+    if bvh.any(ray) { MET } else { MISS }
 }
 
 /// The ray in one world. A ray that leaves a surface starts past it in that surface's own world, so that it does not meet itself. In the other
