@@ -5,7 +5,7 @@
 
 Wants `ffmpeg`, and a Python with `bpy`, `numpy` and `OpenEXR`. Cycles renders the frames, ffmpeg makes a movie of them, which becomes the camera's clip.
 Each frame that the extension decodes must be nearest to the frame that went in, and the mask of what is added lie over Cycles' of the same frame; in the
-compositor the scene's frames must show the film's. The controls are other frames. Writes three frames of the film, and them as they were, to film.png.
+compositor the scene's frames must show the film's. The controls are other frames. Of a shorter movie none of the longer one's frames may be taken. Writes three frames of the film, and them as they were, to film.png.
 Exit code 1 where a bound is missed.
 """
 
@@ -20,6 +20,7 @@ import blender_shots  # first: it finds the extension
 import bpy
 import mixray
 from mixray.export import export_shot
+from mixray.report import Refused
 from mixray.results import Film, load_picture
 
 import blender_scenes
@@ -55,6 +56,27 @@ def movie_of(clip, folder):
     blender_scenes.solve(movie)
     movie.frame_start = BEGIN
     return movie
+
+
+def leaves_out_what_is_not_there(scene, folder):
+    """Whether an export of the movie's first five frames takes those alone, though the folder has more, and refuses a still behind them."""
+    path = folder / "shorter.mp4"
+    subprocess.run(["ffmpeg", "-y", "-loglevel", "error", "-i", str(folder / "plate.mp4"), "-frames:v", "5", "-c", "copy", str(path)], check=True)
+    clip = bpy.data.movieclips.load(str(path))
+    clip.frame_start = BEGIN
+    camera = scene.camera
+    camera.constraints.clear()
+    camera.data.background_images[0].clip = clip
+    shot = export_shot(bpy.context, folder / "shot")
+    there = len(list(shot.frames.iterdir()))
+    scene.mixray.is_sequence = False
+    scene.frame_set(BEGIN + 5)
+    try:
+        export_shot(bpy.context, folder / "shot")
+    except Refused as refusal:
+        print(f"of a shorter movie frames {shot.numbers}, of {there} in the folder; {refusal}")
+        return shot.numbers == (1, 6) and there == 12
+    return False
 
 
 def composited(scene, frame, folder):
@@ -118,6 +140,7 @@ def main():
     rows = [np.concatenate([blender_shots.rgb(planes) for planes in film.values()], 1)]
     rows.append((np.concatenate([plates[frame - 1] for frame in LOOKED_AT], 1) / 255.0) ** 2.2)
     blender_shots.write_png(np.concatenate(rows), folder / "film.png")
+    met &= leaves_out_what_is_not_there(scene, folder)
     sys.exit(0 if met else 1)
 
 
