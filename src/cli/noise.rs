@@ -94,7 +94,7 @@ fn fit(text: &str) -> Result<NoiseFit, &'static str> {
 struct Apply {
     #[command(flatten)]
     layers: LayerArguments,
-    /// The camera's noise, from `mixray noise calibrate`
+    /// The camera's noise, from `mixray noise calibrate` or `estimate`
     #[arg(long, value_name = "NOISE.toml")]
     profile: PathBuf,
     /// Picture to write, .png or .exr
@@ -200,10 +200,13 @@ fn run_estimate(arguments: &Estimate) -> Result<Outcome, Failure> {
     let photo = read_photo(&arguments.photo)?;
     let name = arguments.photo.display().to_string();
     let size = (photo.width, photo.height);
-    let profile = estimate_from_one(&photo.encoded, size, arguments.bins, &name)
+    let estimate = estimate_from_one(&photo.encoded, size, arguments.bins, &name)
         .map_err(|problem| Failure(format!("{name}: {problem}")))?;
-    write_text(&arguments.output, &profile.to_toml())?;
-    print(&summary(&profile, &arguments.output))?;
+    for note in &estimate.notes {
+        say("note", note);
+    }
+    write_text(&arguments.output, &estimate.profile.to_toml())?;
+    print(&summary(&estimate.profile, &arguments.output))?;
     Ok(Outcome::Done)
 }
 

@@ -4,6 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::camera::ray;
 use crate::scene::Camera;
+use crate::scene::projection::project;
 
 /// Triangles of the real world.
 pub struct RealWorld {
@@ -29,6 +30,8 @@ const WANTED: f64 = 0.28;
 const ROWS: [f64; 9] = [0.62, 0.68, 0.74, 0.8, 0.86, 0.92, 0.56, 0.5, 0.44];
 /// To the side, shares of the width.
 const COLUMNS: [f64; 5] = [0.0, -0.06, 0.06, -0.12, 0.12];
+/// Of a model's box, as it would stand: what the camera has to see of it, if it can stand anywhere so.
+const SEEN: f64 = 0.99;
 /// Half the spot that has to be level, share of the width.
 const SPOT: f64 = 0.025;
 /// The steepest slope that carries a model.
@@ -44,6 +47,30 @@ impl RealWorld {
             .filter_map(|triangle| distance(origin, direction, triangle))
             .min_by(f64::total_cmp)?;
         Some(origin + direction * nearest)
+    }
+
+    /// How much of an upright box, whose base's middle stands at `foot`, is in front of everything real, and in the picture.
+    fn share_seen(&self, camera: &Camera, foot: DVec3, size: DVec3) -> f64 {
+        let eye = camera.world_from_camera.w_axis.truncate();
+        let aside = (foot - eye).cross(DVec3::Y).normalize_or_zero();
+        let half = 0.5 * size.x.max(size.z);
+        let steps = [0.15, 0.5, 0.85, 1.0];
+        let places = steps.iter().flat_map(|up| {
+            [-1.0, -0.5, 0.0, 0.5, 1.0]
+                .map(|side| foot + DVec3::Y * (up * size.y) + aside * (side * half))
+        });
+        let is_seen = |place: DVec3| {
+            let Some(pixel) = project(camera, place).map(DVec3::truncate) else {
+                return false;
+            };
+            let inside = pixel.cmpgt(DVec2::ZERO).all()
+                && pixel.x < f64::from(camera.width)
+                && pixel.y < f64::from(camera.height);
+            let nearest = self.seen(camera, pixel).map(|point| (point - eye).length());
+            inside && nearest.is_none_or(|nearest| nearest > (place - eye).length())
+        };
+        let seen: Vec<bool> = places.map(is_seen).collect();
+        seen.iter().filter(|seen| **seen).count() as f64 / seen.len() as f64
     }
 
     /// A level spot about a pixel: its point in the middle height of what was tried.
@@ -94,20 +121,34 @@ pub fn place(
         let pixel = move |offset: &f64| DVec2::new(column + offset, *row) * size;
         COLUMNS.iter().map(pixel)
     });
-    let spot = { pixels }.find_map(|pixel| world.level_spot(camera, pixel));
     let pose = camera.world_from_camera;
     let eye = pose.w_axis.truncate();
+    let scale_at = |point: DVec3| {
+        let depth = -pose.inverse().transform_point3(point).z;
+        let share = (high - low).length() / (depth * size.y / camera.fy);
+        match FITTING.contains(&share) {
+            true => 1.0,
+            false => two_digits(WANTED / share),
+        }
+    };
+    // The first that is wholly in view, else the one that is most so.
+    let mut spot: Option<(DVec3, f64)> = None;
+    for point in pixels.filter_map(|pixel| world.level_spot(camera, pixel)) {
+        let seen = world.share_seen(camera, point, scale_at(point) * (high - low));
+        if spot.is_none_or(|(_, most)| seen > most) {
+            spot = Some((point, seen));
+        }
+        if seen >= SEEN {
+            break;
+        }
+    }
+    let spot = spot.map(|(point, _)| point);
     let point = spot.unwrap_or_else(|| {
         let towards = ray(camera, DVec2::new(column, 0.5) * size)
             .map_or(-pose.z_axis.truncate(), |(_, direction)| direction);
         eye + FLOATING_M * towards
     });
-    let depth = -pose.inverse().transform_point3(point).z;
-    let share = (high - low).length() / (depth * size.y / camera.fy);
-    let scale = match FITTING.contains(&share) {
-        true => 1.0,
-        false => two_digits(WANTED / share),
-    };
+    let scale = scale_at(point);
     let yaw = (eye.x - point.x).atan2(eye.z - point.z);
     let base = DVec3::new(0.5 * (low.x + high.x), low.y, 0.5 * (low.z + high.z));
     let turned = glam::DQuat::from_rotation_y(yaw) * (scale * base);
@@ -129,7 +170,6 @@ fn two_digits(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::projection::project;
     use crate::start::camera::{camera_over_ground, up_of_pitch};
 
     fn square(height: f64, half: f64) -> [[DVec3; 3]; 2] {
@@ -157,6 +197,32 @@ mod tests {
         assert_eq!(place(&world, &camera, (0, 1), small).scale, 1.0);
         let two = [0, 1].map(|i| place(&world, &camera, (i, 2), small).translation.x);
         assert!(two[0] < -0.2 && two[1] > 0.2, "{two:?}");
+    }
+
+    /// A wall before the first spot would hide what stands there.
+    #[test]
+    fn a_model_does_not_stand_behind_real_things() {
+        let camera = camera_over_ground((640, 480), 500.0, up_of_pitch(25.0), 1.5);
+        let small = (DVec3::splat(-0.2), DVec3::splat(0.2));
+        let mut world = RealWorld {
+            triangles: square(0.0, 50.0).to_vec(),
+        };
+        let open = place(&world, &camera, (0, 1), small);
+        let foot = open.translation - 0.2 * DVec3::Y;
+        let at = |x: f64, y: f64| DVec3::new(foot.x + x, y, foot.z + 0.3);
+        world
+            .triangles
+            .push([at(-0.4, 0.0), at(0.4, 0.0), at(0.4, 0.4)]);
+        world
+            .triangles
+            .push([at(-0.4, 0.0), at(0.4, 0.4), at(-0.4, 0.4)]);
+        let placed = place(&world, &camera, (0, 1), small);
+        let seen = |placement: Placement| {
+            let foot = placement.translation - 0.2 * DVec3::Y;
+            world.share_seen(&camera, foot, DVec3::splat(0.4))
+        };
+        assert!(seen(placed) >= SEEN, "{placed:?}");
+        assert!(seen(open) < SEEN, "control");
     }
 
     #[test]

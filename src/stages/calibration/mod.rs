@@ -28,7 +28,7 @@ mod tests;
 
 pub use frames::{SceneFrames, group_frames};
 pub use report::report_html;
-pub use single::estimate_from_one;
+pub use single::{Estimate, estimate_from_one};
 
 use std::path::PathBuf;
 
@@ -96,12 +96,16 @@ pub struct Calibration {
 /// Correlation at the profile's last lag that is no chance and no trace of demosaicing.
 const GRAIN: f64 = 0.1;
 
-/// The largest correlation along an axis at the profile's last lag, if the grain goes on from there.
-fn reach_beyond(profile: &NoiseProfile) -> Option<f64> {
-    let last = (profile.autocorrelation.iter())
+/// Tells the largest correlation along an axis at the profile's last lag, if the grain goes on from there.
+fn note_of_grain(profile: &NoiseProfile) -> Option<String> {
+    let rho = (profile.autocorrelation.iter())
         .flat_map(|lags| [lags[0][2 * LAGS], lags[LAGS][LAGS]])
         .fold(0.0, f64::max);
-    (last > GRAIN).then_some(last)
+    (rho > GRAIN).then(|| {
+        format!(
+            "the noise is alike over more than the {LAGS} pixels that a profile holds (correlation {rho:.2} there): what is rendered has finer grain; expected noise as the sensor gives it; scale the frames and photographs down, or take the camera's denoising off"
+        )
+    })
 }
 
 /// Measures the noise of all `scenes`. `progress` hears how many frames of how many have been read; each is read twice.
@@ -162,11 +166,7 @@ pub fn calibrate(
             ));
         }
     }
-    if let Some(rho) = reach_beyond(&profile) {
-        notes.push(format!(
-            "the noise is alike over more than the {LAGS} pixels that a profile holds (correlation {rho:.2} there): what is rendered has finer grain; expected noise as the sensor gives it; scale the frames and photographs down, or take the camera's denoising off"
-        ));
-    }
+    notes.extend(note_of_grain(&profile));
     Ok(Calibration {
         profile,
         histograms: statistics.histograms,

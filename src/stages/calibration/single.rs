@@ -2,13 +2,14 @@
 //!
 //! By level, the blocks of least variance are those without texture: their median is taken, with those that chance alone makes larger. A plane takes some
 //! of the noise with it, the more the grain is correlated; how much follows from the measured correlation. What is as random as noise in every block of a
-//! level (grass, gravel, fabric) is taken for noise: a calibration from several frames tells them apart, one photograph cannot.
+//! level (grass, gravel, fabric) stands out where other levels have flat blocks (`textured`); where none has, it is taken for noise: a calibration from
+//! several frames tells them apart, one photograph cannot.
 
 use rayon::prelude::*;
 
-use super::CalibrationError;
 use super::estimate::{Sum, fill_from_neighbours, fit_levels, squared_lags};
 use super::quantisation::variance_before_rounding;
+use super::{CalibrationError, note_of_grain};
 use crate::scene::EncodedPhoto;
 use crate::stages::settings::{
     Autocorrelation, LAGS, MAX_BINS, NoiseBin, NoiseProfile, WHITE, bin_index,
@@ -28,8 +29,6 @@ const FEWEST_BLOCKS: usize = 16;
 const FLATTEST: f64 = 0.1;
 /// How much chance makes the variance of one block larger, at the most.
 const CHANCE: f64 = 1.0;
-/// A level this much above its neighbours' variance has texture in all of its blocks.
-const TEXTURED: f64 = 2.25;
 /// 97.5% point of the normal distribution.
 const NORMAL_Z: f64 = 1.96;
 /// How far texture that passes for noise and the choice of flat blocks put sigma off, as a share of it: as found on pairs of photographs and averages of many.
@@ -90,6 +89,14 @@ impl Block {
     }
 }
 
+/// What one photograph shows.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    pub profile: NoiseProfile,
+    /// Notes for the user.
+    pub notes: Vec<String>,
+}
+
 /// Measures the noise of one photograph, as stored, in a profile of `bins` bins. `source` names the photograph.
 ///
 /// # Errors
@@ -99,7 +106,7 @@ pub fn estimate_from_one(
     (width, height): (u32, u32),
     bins: usize,
     source: &str,
-) -> Result<NoiseProfile, CalibrationError> {
+) -> Result<Estimate, CalibrationError> {
     if !bins.is_power_of_two() || bins > MAX_BINS {
         return Err(CalibrationError::Bins(bins));
     }
@@ -113,7 +120,11 @@ pub fn estimate_from_one(
         EncodedPhoto::Linear => return Err(CalibrationError::NoCodes),
     };
     let fine = bins.max(FINE_BINS);
-    let blocks = flat_blocks(&dn, (width as usize, height as usize), fine);
+    let mut blocks = flat_blocks(&dn, (width as usize, height as usize), fine);
+    let textured = textured::levels(&(blocks.iter().map(|b| typical(b))).collect::<Vec<_>>());
+    for bin in &textured {
+        blocks[*bin].clear();
+    }
     let all: Vec<&Block> = blocks.iter().flatten().collect();
     if all.is_empty() {
         return Err(CalibrationError::NothingFlat);
@@ -148,11 +159,10 @@ pub fn estimate_from_one(
         .map(|blocks| bin_of(blocks, &correlation, &true_variance))
         .collect();
     for c in 0..3 {
-        leave_out_textured(&mut fine_bins, c);
         fill_from_neighbours(&mut fine_bins, c);
     }
     let own: Vec<NoiseBin> = (fine_bins.chunks(fine / bins)).map(together).collect();
-    Ok(NoiseProfile {
+    let profile = NoiseProfile {
         bins: own,
         autocorrelation: correlation,
         channel_correlation: [(0, 1), (0, 2), (1, 2)].map(|(a, b)| between(&all, a, b)),
@@ -161,7 +171,10 @@ pub fn estimate_from_one(
             "{source}: one photograph of {width} x {height}, from {} flat blocks of {SIDE} x {SIDE} pixels",
             all.len()
         )],
-    })
+    };
+    let mut notes: Vec<String> = textured::note(&textured, fine).into_iter().collect();
+    notes.extend(note_of_grain(&profile));
+    Ok(Estimate { profile, notes })
 }
 
 /// By bin, the blocks that show noise alone.
@@ -199,6 +212,11 @@ fn flattest(mut blocks: Vec<Block>) -> Vec<Block> {
     }
     blocks.truncate(count);
     blocks
+}
+
+/// Sigma of a level's blocks, DN, the median; None where there is none.
+fn typical(blocks: &[Block]) -> Option<f64> {
+    (blocks.get(blocks.len() / 2)).map(|block| block.mean_variance().sqrt())
 }
 
 /// Mean of `value` by the blocks' weights.
@@ -307,25 +325,6 @@ fn bin_of(
     bin
 }
 
-/// Marks levels far above both measured neighbours to be filled from them.
-fn leave_out_textured(bins: &mut [NoiseBin], c: usize) {
-    let measured: Vec<usize> = (0..bins.len()).filter(|i| !bins[*i].filled[c]).collect();
-    let variance = |i: usize| bins[i].sigma[c].powi(2);
-    let textured: Vec<usize> = (0..measured.len())
-        .filter(|at| {
-            let near = [at.checked_sub(1), Some(at + 1)].into_iter().flatten();
-            let most = near.filter_map(|i| measured.get(i)).map(|i| variance(*i));
-            let most = most.fold(f64::NAN, f64::max);
-            variance(measured[*at]) > TEXTURED * most
-        })
-        .map(|at| measured[at])
-        .collect();
-    for i in textured {
-        bins[i].filled[c] = true;
-        bins[i].samples[c] = 0;
-    }
-}
-
 /// One bin of several, by their pixels; by all alike where none was measured.
 fn together(bins: &[NoiseBin]) -> NoiseBin {
     let mut bin = NoiseBin::default();
@@ -346,6 +345,8 @@ fn together(bins: &[NoiseBin]) -> NoiseBin {
     }
     bin
 }
+
+mod textured;
 
 #[cfg(test)]
 mod tests;

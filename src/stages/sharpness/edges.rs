@@ -12,7 +12,7 @@ const STRIDE: i32 = 8;
 /// Furthest distance from the edge that is looked at, pixels.
 const FAR: i32 = 9;
 /// Bins a pixel.
-const FINE: i32 = 4;
+pub(super) const FINE: i32 = 4;
 /// Bins of a profile, from -[`FAR`] to [`FAR`] pixels.
 pub const BINS: usize = (2 * FAR * FINE) as usize;
 /// From this distance on an edge has to be over, pixels.
@@ -23,6 +23,8 @@ const LEAST_CONTRAST: f64 = 0.03;
 const CROOKED_PX: f64 = 0.5;
 /// Largest deviation on the sides, in steps.
 const UNEVEN: f64 = 0.15;
+/// Slope of a normal distribution's edge at 10% of the step, over the mean slope from there to 50%.
+const SLOPE_AT_TENTH: f64 = 0.56;
 /// Linear values from here on may be clipped.
 const CLIPPED: f32 = 0.97;
 
@@ -37,6 +39,8 @@ pub struct Edge {
     pub profiles: [[f64; BINS]; 3],
     /// From 10% to 90% of green's step, pixels.
     pub spread_px: f64,
+    /// Standard deviation of that: as far as what is uneven on both sides moves the crossings.
+    pub spread_error_px: f64,
     /// By channel: distance of its half from that of green, along the normal, pixels.
     pub shift_px: [f64; 3],
 }
@@ -243,14 +247,17 @@ impl Pixels<'_> {
             // The other channels' steps may be small and their noise large.
             normalised(means, if c == 1 { UNEVEN } else { 3.0 * UNEVEN })
         });
-        let [Some(red), Some(green), Some(blue)] = profiles else {
+        let [Some((red, _)), Some((green, uneven)), Some((blue, _))] = profiles else {
             return None;
         };
         let halves = [red, green, blue].map(|profile| crossing(&profile, 0.5));
         let [Some(red_half), Some(half), Some(blue_half)] = halves else {
             return None;
         };
-        let spread_px = crossing(&green, 0.9)? - crossing(&green, 0.1)?;
+        let (tenth, rest) = (crossing(&green, 0.1)?, crossing(&green, 0.9)?);
+        let spread_px = rest - tenth;
+        let steepness = SLOPE_AT_TENTH * 0.4;
+        let spread_error_px = uneven / steepness * (half - tenth).hypot(rest - half);
         if half.abs() > 1.0 {
             return None;
         }
@@ -262,13 +269,14 @@ impl Pixels<'_> {
             normal,
             profiles: [red, green, blue].map(|profile| shifted(&profile, half)),
             spread_px,
+            spread_error_px,
             shift_px: [red_half - half, 0.0, blue_half - half],
         })
     }
 }
 
-/// From 0 to 1, if there is a step, and its sides deviate by no more than `uneven` steps.
-fn normalised(profile: [f64; BINS], uneven: f64) -> Option<[f64; BINS]> {
+/// From 0 to 1, if there is a step, and its sides deviate by no more than `uneven` steps; and by how many they do.
+fn normalised(profile: [f64; BINS], uneven: f64) -> Option<([f64; BINS], f64)> {
     let side = |wanted: &dyn Fn(f64) -> bool| {
         let values: Vec<f64> = (0..BINS)
             .filter(|bin| wanted(distance_px(*bin)))
@@ -282,8 +290,9 @@ fn normalised(profile: [f64; BINS], uneven: f64) -> Option<[f64; BINS]> {
     let (dark, dark_spread) = side(&|d| d < -PLATEAU);
     let (bright, bright_spread) = side(&|d| d > PLATEAU);
     let step = bright - dark;
-    let even = dark_spread.max(bright_spread) < uneven * step;
-    (step > 0.5 * LEAST_CONTRAST && even).then(|| profile.map(|value| (value - dark) / step))
+    let spread = dark_spread.max(bright_spread);
+    let is_edge = step > 0.5 * LEAST_CONTRAST && spread < uneven * step;
+    is_edge.then(|| (profile.map(|value| (value - dark) / step), spread / step))
 }
 
 /// Where a profile passes `level`, from the middle outwards, pixels.

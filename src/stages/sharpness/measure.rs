@@ -1,15 +1,19 @@
 //! From a photograph's edges to the point spread of its camera.
 
 use super::PointSpread;
-use super::edges::{BINS, Edge, crossing, edges_of};
+use super::edges::{BINS, Edge, FINE, crossing, edges_of};
 use super::model::Sharpened;
 
-/// Fewer edges in focus tell nothing.
-const FEWEST: usize = 5;
+/// Fewer edges tell nothing.
+const FEWEST: usize = 12;
+/// As many edges have to be surely (two standard deviations) as sharp as what counts as in focus: what is sharpest by chance is not.
+const SUREST: usize = 5;
+/// How much softer than those an edge in focus may be.
+const IN_FOCUS: f64 = 1.2;
+/// Sharpening shows nearer to an edge than this, pixels: farther away it is texture and noise.
+const OVERSHOOT_PX: usize = 4;
 /// Fewer edges in one half of the picture do not tell the centre from the corners.
 const FEWEST_OF_HALF: usize = 40;
-/// Share of the edges, the sharpest left out, that count as in focus: softer ones are out of focus, or round.
-const IN_FOCUS: std::ops::Range<f64> = 0.05..0.4;
 /// Fewer edges in focus do not tell lateral colour.
 const FEWEST_OF_LATERAL: usize = 40;
 /// How much softer the outer half has to be.
@@ -28,7 +32,8 @@ pub struct Measured {
     /// From 10% to 90% of a step of green, pixels: of the edges in focus, and of the point spread.
     pub edge_spread_px: f64,
     pub fitted_spread_px: f64,
-    /// How far the edges in focus go beyond 0 and 1, mean of both sides; and of the point spread.
+    /// How far the edges in focus go beyond 0 and 1 at most, mean of both sides at one distance; and of the point spread. What one side has alone is no
+    /// filter's in linear light.
     pub overshoot: f64,
     pub fitted_overshoot: f64,
 }
@@ -37,7 +42,7 @@ pub struct Measured {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoEdges {
     #[error(
-        "the photograph has {0} straight, isolated edges in focus, and {FEWEST} are needed; give numbers, such as sigma_px = 0.8"
+        "the photograph has {0} straight, isolated edges, and {FEWEST} are needed; give numbers, such as sigma_px = 0.8"
     )]
     TooFew(usize),
     #[error("there is no photograph to measure; give numbers, such as sigma_px = 0.8")]
@@ -50,11 +55,11 @@ pub enum NoEdges {
 /// Too few of its edges can be measured.
 pub fn measure(linear: &[[f32; 3]], size: (u32, u32)) -> Result<Measured, NoEdges> {
     let mut edges = edges_of(linear, size);
+    if edges.len() < FEWEST {
+        return Err(NoEdges::TooFew(edges.len()));
+    }
     edges.sort_by(|a, b| a.spread_px.total_cmp(&b.spread_px));
     let focused = in_focus(&edges);
-    if focused.len() < FEWEST {
-        return Err(NoEdges::TooFew(focused.len()));
-    }
     let profiles = [0, 1, 2].map(|c| mean_profile(focused, c));
     let green = Sharpened::fit(&profiles[1]);
     let of_channels = profiles.map(|profile| green.refit(&profile).sigma_px);
@@ -79,10 +84,17 @@ pub fn measure(linear: &[[f32; 3]], size: (u32, u32)) -> Result<Measured, NoEdge
     })
 }
 
-/// Those of the sorted `edges` that are in focus.
+/// Those of the sorted `edges` that are in focus: softer ones are out of focus, or round.
 fn in_focus(edges: &[Edge]) -> &[Edge] {
-    let at = |share: f64| (share * edges.len() as f64).round() as usize;
-    &edges[at(IN_FOCUS.start)..at(IN_FOCUS.end)]
+    let mut bounds: Vec<f64> = (edges.iter())
+        .map(|edge| edge.spread_px + 2.0 * edge.spread_error_px)
+        .collect();
+    bounds.sort_by(f64::total_cmp);
+    let Some(sharp) = bounds.get(SUREST - 1) else {
+        return &[];
+    };
+    let count = edges.partition_point(|edge| edge.spread_px <= IN_FOCUS * sharp);
+    &edges[..count]
 }
 
 fn mean_profile(edges: &[Edge], channel: usize) -> [f64; BINS] {
@@ -99,9 +111,11 @@ fn edge_spread(profile: &[f64; BINS]) -> f64 {
 }
 
 fn overshoot(profile: &[f64; BINS]) -> f64 {
-    let most = profile.iter().copied().fold(1.0, f64::max);
-    let least = profile.iter().copied().fold(0.0, f64::min);
-    0.5 * ((most - 1.0) - least)
+    let middle = BINS / 2;
+    let beyond = |out: usize| 0.5 * (profile[middle + out] - 1.0 - profile[middle - 1 - out]);
+    (0..OVERSHOOT_PX * FINE as usize)
+        .map(beyond)
+        .fold(0.0, f64::max)
 }
 
 /// Half a diagonal from the centre is 1.

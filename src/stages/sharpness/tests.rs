@@ -1,6 +1,6 @@
 use super::{PointSpread, VirtualLight, sharpen};
 use crate::film::Picture;
-use crate::stages::test_support::{SIZE, codes_apart, mask, picture, stages};
+use crate::stages::test_support::{SIZE, codes_apart, mask, picture, random, stages};
 
 fn lens() -> PointSpread {
     PointSpread {
@@ -111,6 +111,18 @@ fn energy_is_kept() {
 
 /// A photograph of slanted squares, drawn by area coverage eight times finer, gone through `spread` alone.
 fn squares(spread: &PointSpread) -> Picture {
+    let mut picture = sharp_squares();
+    let mask = vec![1.0; picture.linear.len()];
+    let light = VirtualLight {
+        photo: None,
+        mask: &mask,
+        ratio: None,
+    };
+    sharpen(&mut picture, &light, spread);
+    picture
+}
+
+fn sharp_squares() -> Picture {
     const FINE: i32 = 8;
     let (width, height) = (320, 240);
     let linear = (0..width * height)
@@ -128,19 +140,11 @@ fn squares(spread: &PointSpread) -> Picture {
             [0.1 + 0.5 * inside as f32 / (FINE * FINE) as f32; 3]
         })
         .collect();
-    let mut picture = Picture {
+    Picture {
         width: width as u32,
         height: height as u32,
         linear,
-    };
-    let mask = vec![1.0; picture.linear.len()];
-    let light = VirtualLight {
-        photo: None,
-        mask: &mask,
-        ratio: None,
-    };
-    sharpen(&mut picture, &light, spread);
-    picture
+    }
 }
 
 fn measured(picture: &Picture) -> super::Measured {
@@ -168,6 +172,49 @@ fn the_measured_sharpness_is_that_of_the_picture() {
         let ideal = measured(&squares(&PointSpread::gaussian(0.0)));
         assert!(ideal.edge_spread_px < 0.8 * photo.edge_spread_px, "control");
     }
+}
+
+/// A third of the picture is in focus, the rest far out of it, and all of it is noisy: what is in focus counts.
+#[test]
+fn an_object_in_focus_is_as_sharp_as_what_is_in_focus() {
+    let (sharp, soft) = (PointSpread::gaussian(0.8), PointSpread::gaussian(2.2));
+    let (mut photo, blurred) = (squares(&sharp), squares(&soft));
+    let width = photo.width as usize;
+    for (i, (value, blurred)) in photo.linear.iter_mut().zip(&blurred.linear).enumerate() {
+        if i % width > width / 3 {
+            *value = *blurred;
+        }
+        for (c, value) in value.iter_mut().enumerate() {
+            let normal = (0..12).map(|k| random(3 * i + c, 40 + k)).sum::<f32>() - 6.0;
+            *value += 0.008 * normal;
+        }
+    }
+    let found = measured(&photo).edge_spread_px;
+    let known = measured(&squares(&sharp)).edge_spread_px;
+    assert!((found / known - 1.0).abs() < 0.1, "{found}, not {known}");
+    let all = measured(&blurred).edge_spread_px;
+    assert!(all > 2.0 * known, "control: {all}");
+}
+
+/// Noise makes no overshoot, and a bright rim on one side alone is no sharpening.
+#[test]
+fn overshoot_is_on_both_sides_near_the_edge() {
+    let mut photo = squares(&PointSpread::gaussian(0.9));
+    for (i, value) in photo.linear.iter_mut().enumerate() {
+        for (c, value) in value.iter_mut().enumerate() {
+            let normal = (0..12).map(|k| random(3 * i + c, 90 + k)).sum::<f32>() - 6.0;
+            *value += 0.01 * normal;
+        }
+    }
+    let plain = measured(&photo);
+    assert!(plain.overshoot < 0.01, "{plain:?}");
+    let sharpened = PointSpread {
+        sharpening: 1.2,
+        sharpening_radius_px: 1.5,
+        ..PointSpread::gaussian(0.9)
+    };
+    let sharpened = measured(&squares(&sharpened));
+    assert!(sharpened.overshoot > 0.04, "control: {sharpened:?}");
 }
 
 #[test]
@@ -214,5 +261,7 @@ fn virtual_edges_are_as_soft_as_five_photographs() {
         );
         let ratio = virtually.edge_spread_px / real.edge_spread_px;
         assert!((ratio - 1.0).abs() < 0.1, "{name}: {ratio}");
+        let off = virtually.overshoot - real.overshoot;
+        assert!(off.abs() < 0.02, "{name}: {off}");
     }
 }

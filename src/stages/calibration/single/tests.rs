@@ -38,7 +38,7 @@ fn photograph(sigma: f32, is_grain: bool) -> EncodedPhoto {
 fn known_grain_is_found() {
     for (sigma, is_grain, rho) in [(3.0, true, 0.5), (3.0, false, 0.0), (0.8, true, 0.5)] {
         let photo = photograph(sigma, is_grain);
-        let profile = estimate_from_one(&photo, SIZE, 16, "made").unwrap();
+        let profile = estimate_from_one(&photo, SIZE, 16, "made").unwrap().profile;
         // Levels 90 to 115: the half without squares.
         let bin = &profile.bins[bin_index(100.0, 16)];
         for c in 0..3 {
@@ -79,7 +79,9 @@ fn data(folder: &str) -> Option<PathBuf> {
 
 fn estimate(path: &Path, bins: usize) -> NoiseProfile {
     let (width, height, codes) = read_codes(path).unwrap();
-    estimate_from_one(&codes, (width, height), bins, "photograph").unwrap()
+    estimate_from_one(&codes, (width, height), bins, "photograph")
+        .unwrap()
+        .profile
 }
 
 /// One shot of a flat field against the calibration by all ten.

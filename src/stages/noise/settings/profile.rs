@@ -195,7 +195,7 @@ impl NoiseProfile {
         // Writing to a string cannot fail.
         let _ = write!(
             out,
-            "# A camera's noise, made by `mixray noise calibrate`. Unit: DN, 8-bit codes of the encoded picture (0 to 255; 16-bit\n\
+            "# A camera's noise, made by `mixray noise`. Unit: DN, 8-bit codes of the encoded picture (0 to 255; 16-bit\n\
              # pictures bring fractions). Lists are red, green, blue. The variance of rounding to codes is not included.\n\
              format = \"{FORMAT}\"\nversion = {NOISE_PROFILE_VERSION}\n\n\
              # Folder, frames, size, how sigma was estimated.\nsources = [\n"
