@@ -112,6 +112,29 @@ def chessboard_print(x, z, square=0.03):
     return light
 
 
+def looking(distance, azimuth, height, roll):
+    """At the board's middle: rotation and translation, camera from board."""
+    eye = distance * np.array([np.cos(height) * np.cos(azimuth), np.sin(height), np.cos(height) * np.sin(azimuth)])
+    z = -eye / np.linalg.norm(eye)
+    x = np.cross(z, [0, 1, 0])
+    x /= np.linalg.norm(x)
+    y = np.cross(z, x)
+    rotation = np.stack([np.cos(roll) * x + np.sin(roll) * y, np.cos(roll) * y - np.sin(roll) * x, z])
+    return rotation, -rotation @ eye
+
+
+def by_hand(secs):
+    """A camera that a hand moves to and fro while it goes around the board."""
+    rotation, translation = looking(0.55, 0.4 + 0.8 * secs, np.radians(60 + 10 * np.sin(7 * secs)), 0.1 + 0.3 * np.sin(5 * secs))
+    return rotation, translation + [0.04 * np.sin(8 * secs), 0.03 * np.cos(9 * secs), 0]
+
+
+def row_by_row(secs, readout_secs):
+    """Where the camera is at each row's own time."""
+    rows = [by_hand(secs + readout_secs * (row / (HEIGHT - 1) - 0.5)) for row in range(HEIGHT)]
+    return tuple(np.stack(part) for part in zip(*rows))
+
+
 def views(count, seed, distances):
     """Rotation and translation, camera from board; the whole board is seen."""
     random = np.random.default_rng(seed)
@@ -120,13 +143,7 @@ def views(count, seed, distances):
     while len(found) < count:
         distance = distances(len(found), random)
         azimuth, height, roll = random.uniform(0, 2 * np.pi), np.radians(random.uniform(35, 85)), random.uniform(-np.pi, np.pi)
-        eye = distance * np.array([np.cos(height) * np.cos(azimuth), np.sin(height), np.cos(height) * np.sin(azimuth)])
-        z = -eye / np.linalg.norm(eye)
-        x = np.cross(z, [0, 1, 0])
-        x /= np.linalg.norm(x)
-        y = np.cross(z, x)
-        rotation = np.stack([np.cos(roll) * x + np.sin(roll) * y, np.cos(roll) * y - np.sin(roll) * x, z])
-        translation = -rotation @ eye
+        rotation, translation = looking(distance, azimuth, height, roll)
         seen = project(board, rotation, translation)
         if (seen > 8).all() and (seen < [WIDTH - 9, HEIGHT - 9]).all():
             found.append((rotation, translation))
@@ -142,10 +159,14 @@ def render(folder, print_board, poses, seed, side=4, blurs=(0.5, 0.8, 1.2)):
     random = np.random.default_rng(seed)
     directions = rays(side)
     for index, (rotation, translation) in enumerate(poses):
-        eye = -rotation.T @ translation
+        # One of the whole picture, or one for each of its rows.
+        rotation, translation = rotation.reshape(-1, 3, 3), translation.reshape(-1, 3)
+        if len(rotation) > 1:
+            rotation, translation = rotation.repeat(side, 0), translation.repeat(side, 0)
+        eye = -np.einsum("rji,rj->ri", rotation, translation)[:, None]
         ways = directions @ rotation
-        reach = -eye[1] / ways[..., 1]
-        light = print_board(eye[0] + reach * ways[..., 0], eye[2] + reach * ways[..., 2])
+        reach = -eye[..., 1] / ways[..., 1]
+        light = print_board(eye[..., 0] + reach * ways[..., 0], eye[..., 2] + reach * ways[..., 2])
         light[reach < 0] = 0.1
         light = light.reshape(HEIGHT, side, WIDTH, side).mean((1, 3)) * random.uniform(0.5, 1.0)
         light = cv2.GaussianBlur(light, (0, 0), random.choice(blurs))
@@ -295,6 +316,11 @@ def write_y4m(path, frames):
         out.write(b"YUV4MPEG2 W%d H%d F25:1 Ip A1:1 C420jpeg\n" % (WIDTH, HEIGHT))
         for frame in frames:
             out.write(b"FRAME\n" + cv2.cvtColor(frame, cv2.COLOR_BGR2YUV_I420).tobytes())
+
+
+def write_lens(path):
+    """As OpenCV has it."""
+    path.write_text(f"%YAML:1.0\n---\nimage_width: {WIDTH}\nimage_height: {HEIGHT}\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: {K.ravel().tolist()}\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: {D.tolist()}\n")
 
 
 def visible(found):
@@ -457,6 +483,20 @@ def measure(mixray, data, folder):
     error = corner_errors([f["seen"] for f in own["frames"]], truth, points, True)
     row("synthetic corners, chessboard", "0.025 px", error, f"{error:.4f} px", f"{corner_errors(corners, truth, points, True):.3f} px (cornerSubPix)", lambda v: v <= 0.025)
 
+    write_lens(folder / "lens.yaml")
+    held = ["--board", folder / "grid.toml", "--board-flatness", "rigid", "--intrinsics", folder / "lens.yaml", "--fix-intrinsics"]
+    readout_secs, times = 0.020, np.arange(30) / 25
+    render(folder / "rolling", lambda x, z: printed(x, z, binary_marker(codes)), [row_by_row(t, readout_secs) for t in times], 5, 4, (0.8,))
+    write_y4m(folder / "rolling.y4m", [cv2.imread(str(p)) for p in sorted((folder / "rolling").iterdir())])
+    # The first and the last two have fewer neighbours to tell their motion.
+    inner = lambda found: pose_errors(own_poses(found)[2:-2], [by_hand(t) for t in times[2:-2]])
+    given, without = (mixray.track(folder / "rolling.y4m", *held, *flag) for flag in (["--readout-time", "20ms"], []))
+    (mm, degrees), (bad_mm, bad_degrees) = inner(given), inner(without)
+    row("rolling shutter of 20 ms, hand held: poses", "0.3 mm, 0.03 degrees", (rms(mm), rms(degrees)), f"{rms(mm):.3f} mm, {rms(degrees):.4f} degrees; without `--readout-time` {rms(bad_mm):.1f} mm, {rms(bad_degrees):.2f} degrees", "-", lambda v: v[0] <= 0.3 and v[1] <= 0.03)
+    found = mixray.track(folder / "rolling.y4m", *held, "--readout-time", "solve")["rows"]
+    solved_ms, sigma_ms = 1e3 * found["readout_secs"], 1e3 * found["sigma_secs"]
+    row("the same: readout time solved for", "20 ms within 3 standard deviations", (solved_ms, sigma_ms), f"{solved_ms:.2f} +- {sigma_ms:.2f} ms", "-", lambda v: abs(v[0] - 20) <= 3 * v[1])
+
     video = data / "webcam_chessboard_video/movie.mjpeg"
     own = mixray.track(video, "--board", folder / "chess.toml", "--board-flatness", "rigid")
     peer_found = sum(bool(cv2.findChessboardCorners(cv2.cvtColor(f, cv2.COLOR_BGR2GRAY), INNER)[0]) for f in read_frames(video))
@@ -470,7 +510,6 @@ def measure(mixray, data, folder):
         name = f"tags{distance}"
         render(folder / name, lambda x, z: printed(x, z, picture_marker(images)), truth, 8, 4, (0.8,))
         # The lens is given: four views of one distance determine none.
-        (folder / "lens.yaml").write_text(f"%YAML:1.0\n---\nimage_width: {WIDTH}\nimage_height: {HEIGHT}\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: {K.ravel().tolist()}\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: {D.tolist()}\n")
         own = mixray.track(folder / name, "--board", folder / "tags.toml", "--intrinsics", folder / "lens.yaml", "--fix-intrinsics", "--gamma", "2.2")
         count = sum(len(f["ids"]) for f in own["frames"])
         pictures = [cv2.imread(str(p), 0) for p in sorted((folder / name).iterdir())]

@@ -1,20 +1,19 @@
 //! Rows that a sensor reads one after the other: what a frame shows is put back to where it was in the middle of the frame's time.
 //!
-//! A row is off by the way that the picture has gone between the row's own time and the middle: the picture's velocity there, which the poses of
-//! neighbouring frames tell, times what lies between. Poses follow from corners and corners from poses, so all is solved again, a few times.
+//! A row is off by the way that the picture has gone between the row's own time and the middle, which the poses of neighbouring frames tell. Poses follow
+//! from corners and corners from poses, so all is solved again, a few times.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::TrackError;
+use super::bundle::Solution;
 use super::detector::{FrameSeen, sighting};
-use super::edge::Sides;
 use super::frame_pose::{Observation, fit};
 use super::lens::Lens;
 use super::marker::{Marker, Seen};
 use super::options::{Readout, TrackOptions};
 use super::pose::Pose;
-use super::quad::Quad;
 use super::solved::{Solved, solve};
 
 /// The readout time that poses were found with.
@@ -85,7 +84,9 @@ pub fn solve_rows(
     let rows = Rows {
         readout_secs: share * period,
         sigma_secs: sigma.map(|sigma| sigma * period),
-        frames_as_they_came: posed.filter(|frame| motion.ways(*frame).is_none()).count(),
+        frames_as_they_came: posed
+            .filter(|frame| motion.around(*frame).is_none())
+            .count(),
     };
     Ok((solved, rows))
 }
@@ -113,8 +114,62 @@ struct Motion<'a> {
     last_row: f64,
 }
 
-/// Poses nearby and the share of each in the velocity: pixels a frame are their places, weighted.
-type Ways = Vec<(Pose, f64)>;
+/// Frames, by how many they come after one, that tell how things move in it: the first of these sets that all have a pose.
+const NODES: [&[isize]; 6] = [
+    &[-2, -1, 0, 1, 2],
+    &[-1, 0, 1],
+    &[0, 1, 2],
+    &[-2, -1, 0],
+    &[0, 1],
+    &[-1, 0],
+];
+
+/// Poses around a frame's own.
+struct Around {
+    nodes: &'static [isize],
+    poses: Vec<Pose>,
+}
+
+impl Around {
+    /// Frames before and after it tell its motion.
+    fn is_between(&self) -> bool {
+        self.nodes.first() < Some(&0) && self.nodes.last() > Some(&0)
+    }
+
+    /// `None`: one of the poses has the point behind it.
+    fn path(&self, lens: &Lens, point: DVec3) -> Option<Path> {
+        let places = self.poses.iter().map(|pose| {
+            let seen = pose.of(point);
+            let ideal = DVec2::new(seen.x, seen.y) / seen.z;
+            (seen.z > 1e-6).then(|| lens.pixel_of(ideal))
+        });
+        Some(Path {
+            nodes: self.nodes,
+            places: places.collect::<Option<_>>()?,
+        })
+    }
+}
+
+/// Where a point of the board is in the pictures around a frame.
+struct Path {
+    nodes: &'static [isize],
+    places: Vec<DVec2>,
+}
+
+impl Path {
+    /// Pixels from where it is in the frame to where it is so many frames later, on the polynomial through all places (Lagrange).
+    fn way(&self, frames: f64) -> DVec2 {
+        let each = self.nodes.iter().zip(&self.places).map(|(node, place)| {
+            let others = self.nodes.iter().filter(|other| *other != node);
+            let weight: f64 = others
+                .map(|other| (frames - *other as f64) / (node - other) as f64)
+                .product();
+            let own = if *node == 0 { 1.0 } else { 0.0 };
+            *place * (weight - own)
+        });
+        each.sum()
+    }
+}
 
 impl<'a> Motion<'a> {
     fn of(solved: &'a Solved, height: usize) -> Self {
@@ -134,61 +189,41 @@ impl<'a> Motion<'a> {
         self.poses.get(at).copied().flatten()
     }
 
-    /// The best difference that the neighbours allow; `None`: none has a pose.
-    fn ways(&self, frame: usize) -> Option<Ways> {
-        const DIFFERENCES: [&[(isize, f64)]; 4] = [
-            &[
-                (-2, 1.0 / 12.0),
-                (-1, -8.0 / 12.0),
-                (1, 8.0 / 12.0),
-                (2, -1.0 / 12.0),
-            ],
-            &[(-1, -0.5), (1, 0.5)],
-            &[(0, -1.0), (1, 1.0)],
-            &[(-1, -1.0), (0, 1.0)],
-        ];
-        DIFFERENCES.into_iter().find_map(|difference| {
-            let each = difference.iter();
-            each.map(|(after, weight)| Some((self.pose(frame, *after)?, *weight)))
-                .collect()
+    /// `None`: the frame has no pose, or no neighbour has one.
+    fn around(&self, frame: usize) -> Option<Around> {
+        NODES.into_iter().find_map(|nodes| {
+            let poses = nodes.iter().map(|after| self.pose(frame, *after));
+            Some(Around {
+                nodes,
+                poses: poses.collect::<Option<_>>()?,
+            })
         })
     }
 
-    fn lens(&self) -> &Lens {
-        &self.solved.solution.lens
-    }
-
-    /// Pixels a frame; `None`: one of the poses has the point behind it.
-    fn velocity(&self, ways: &Ways, point: DVec3) -> Option<DVec2> {
-        let each = ways.iter().map(|(pose, weight)| {
-            let seen = pose.of(point);
-            let ideal = DVec2::new(seen.x, seen.y) / seen.z;
-            (seen.z > 1e-6).then(|| self.lens().pixel_of(ideal) * *weight)
-        });
-        each.sum()
-    }
-
-    /// Where what is seen at a place was in the middle of the frame's time; the share of a frame that readout takes.
-    fn still(&self, place: DVec2, velocity: DVec2, share: f64) -> DVec2 {
-        place - velocity * (share * ((place.y - 0.5) / self.last_row - 0.5))
+    /// From the frame's middle to the time of a row, in frames, where readout takes that share of one.
+    fn time_of(&self, place: DVec2, share: f64) -> f64 {
+        share * ((place.y - 0.5) / self.last_row - 0.5)
     }
 
     fn all_still(&self, seen: &[FrameSeen], share: f64) -> Vec<FrameSeen> {
         let frames = seen.par_iter().enumerate();
         frames
-            .map(|(frame, seen)| match self.ways(frame) {
-                Some(ways) => self.frame_still(seen, &ways, share),
+            .map(|(frame, seen)| match self.around(frame) {
+                Some(around) => self.frame_still(seen, &around, share),
                 None => seen.clone(),
             })
             .collect()
     }
 
-    fn frame_still(&self, seen: &FrameSeen, ways: &Ways, share: f64) -> FrameSeen {
+    /// All that is seen, where it was in the middle of the frame's time.
+    fn frame_still(&self, seen: &FrameSeen, around: &Around, share: f64) -> FrameSeen {
+        let Solution { lens, points, .. } = &self.solved.solution;
         let observed = |all: &[Observation]| -> Vec<Observation> {
             let each = all.iter().map(|o| {
-                let velocity = self.velocity(ways, self.solved.solution.points[o.point]);
+                let path = around.path(lens, points[o.point]);
+                let way = path.map(|path| path.way(self.time_of(o.pixel, share)));
                 Observation {
-                    pixel: velocity.map_or(o.pixel, |v| self.still(o.pixel, v, share)),
+                    pixel: o.pixel - way.unwrap_or_default(),
                     ..*o
                 }
             });
@@ -199,7 +234,7 @@ impl<'a> Motion<'a> {
             FrameSeen::Corners(corners) => FrameSeen::Corners(observed(corners)),
             FrameSeen::Markers(seen) => FrameSeen::Markers(Seen {
                 markers: (seen.markers.iter())
-                    .map(|marker| self.marker_still(marker, ways, share))
+                    .map(|marker| self.marker_still(marker, around, share))
                     .collect(),
                 between: observed(&seen.between),
                 ..seen.clone()
@@ -207,41 +242,39 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// Along a side the velocity goes evenly from one corner's to the next.
-    fn marker_still(&self, marker: &Marker, ways: &Ways, share: f64) -> Marker {
+    /// Along a side the way goes evenly from one corner's to the next.
+    fn marker_still(&self, marker: &Marker, around: &Around, share: f64) -> Marker {
+        let Solution { lens, points, .. } = &self.solved.solution;
         let Some(first) = self.solved.board.markers.get(&marker.id) else {
             return marker.clone();
         };
-        let mut velocities: Quad = Default::default();
-        for (k, velocity) in velocities.iter_mut().enumerate() {
-            let point = self.solved.solution.points[first + k];
-            let Some(own) = self.velocity(ways, point) else {
-                return marker.clone();
-            };
-            *velocity = own;
-        }
-        let moved = |side: usize, place: DVec2| {
-            let (from, to) = (marker.corners[side], marker.corners[(side + 1) % 4]);
-            let along = (place - from).dot(to - from) / from.distance_squared(to);
-            let velocity = velocities[side].lerp(velocities[(side + 1) % 4], along);
-            self.still(place, velocity, share)
+        let paths = (0..4).map(|k| around.path(lens, points[first + k]));
+        let Some(paths) = paths.collect::<Option<Vec<Path>>>() else {
+            return marker.clone();
         };
-        let sides: Sides = marker.sides.moved(moved);
+        let moved = |side: usize, place: DVec2| {
+            let next = (side + 1) % 4;
+            let (from, to) = (marker.corners[side], marker.corners[next]);
+            let along = (place - from).dot(to - from) / from.distance_squared(to);
+            let frames = self.time_of(place, share);
+            place - paths[side].way(frames).lerp(paths[next].way(frames), along)
+        };
         Marker {
             corners: std::array::from_fn(|k| moved(k, marker.corners[k])),
-            sides,
+            sides: marker.sides.moved(moved),
             ..marker.clone()
         }
     }
 
-    /// Cost of all frames with that readout, lens and board being as they are: squared standard deviations.
+    /// Cost with that readout of all frames that lie between others, lens and board being as they are: squared standard deviations.
     fn cost(&self, seen: &[FrameSeen], share: f64) -> f64 {
         let Solved {
             board, solution, ..
         } = self.solved;
         let each = seen.par_iter().enumerate().filter_map(|(frame, seen)| {
-            let (start, ways) = (self.pose(frame, 0)?, self.ways(frame)?);
-            let still = self.frame_still(seen, &ways, share);
+            let around = self.around(frame).filter(Around::is_between)?;
+            let start = self.pose(frame, 0)?;
+            let still = self.frame_still(seen, &around, share);
             let (sighting, _) = sighting(&still, board, Some(&solution.lens));
             let observations = &sighting.observations;
             let found = fit(

@@ -153,7 +153,7 @@ mod tests {
         assert_eq!(window.state().size(), Some([6, 5]));
         window.get_by_label("12 of 25 frames/s");
         assert!(!closes(&window), "control");
-        window.key_press(Key::Escape);
+        window.key_down(Key::Escape);
         window.step();
         assert!(closes(&window));
 
