@@ -184,7 +184,7 @@ impl FrameSource {
                     VideoFrame {
                         photo: Photo::from_srgb8(header.width, header.height, codes),
                         pixels: Pixels::Planes(planes),
-                        warnings: Vec::new(),
+                        warnings: header.warning().into_iter().collect(),
                     }
                 };
                 let taken = match (wanted(&name), frame) {
