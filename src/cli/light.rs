@@ -112,7 +112,7 @@ fn run_fit(arguments: &Fit) -> Result<Outcome, Failure> {
         say("warning", &white_sky_told(&fit));
     }
     if fit.is_poor() {
-        say("warning", POOR);
+        say("warning", if fit.is_worse() { WORSE } else { POOR });
         return Ok(Outcome::CheckFailed);
     }
     if let Some(output) = written {
@@ -125,6 +125,8 @@ fn run_fit(arguments: &Fit) -> Result<Outcome, Failure> {
 }
 
 const POOR: &str = "the photograph's shading is not that of this proxy under an environment and a sun: everything is kept, and no scene is written; look at --residual: is the proxy aligned, is it complete, do lamps near by light it?";
+
+const WORSE: &str = "the light that the scene has explains more of the photograph than what was found: everything is kept, and no scene is written; look at --residual";
 
 fn white_sky_told(fit: &LightFit) -> String {
     format!(

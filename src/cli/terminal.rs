@@ -27,8 +27,12 @@ pub(super) fn shows_progress() -> bool {
     !is_quiet() && std::io::stderr().is_terminal()
 }
 
-/// A message to the user, one line.
+/// A message to the user, one line. A note of a renderer that is a warning says so itself.
 pub(super) fn say(kind: &str, message: &str) {
+    let (kind, message) = match message.strip_prefix("warning: ") {
+        Some(warning) => ("warning", warning),
+        None => (kind, message),
+    };
     if is_quiet() && matches!(kind, "note" | "warning") {
         return;
     }

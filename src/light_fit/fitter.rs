@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::comparisons::{Clusters, Comparisons, Costs, Linearised};
+use super::comparisons::{Clusters, Comparisons, Costs};
 use super::directions::ROTATIONS;
 use super::points::Grid;
 use super::rays::{Openness, sunlight};
@@ -17,13 +17,12 @@ pub const STRIDE: usize = 3;
 /// Suns are looked for higher than this, sine of the elevation.
 const LEAST_ELEVATION: f32 = 0.08;
 /// Light of a sun over that of the surroundings, means over the points, that a search tries.
-const STRENGTHS: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
+const STRENGTHS: [f64; 9] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+/// Between them, for this many of the best suns: by factors that are halved (ln), from the first to the last.
+const CLOSER: usize = 96;
+const CLOSER_STEPS: [f64; 4] = [0.35, 0.17, 0.09, 0.04];
 /// Irradiance that no logarithm is taken below, of the mean.
 const DARKEST: f64 = 1e-4;
-/// Fewer do not tell their scatter.
-const LEAST_CLUSTERS: usize = 8;
-/// Half the steps of the slopes by direction and rotation, degrees.
-const SLOPE_STEP_DEG: f64 = 2.0;
 const DESCENT: Descent = Descent {
     steps: 20,
     first_damping: 1e-3,
@@ -107,7 +106,7 @@ impl Fitter<'_> {
         scale * off.map_or(1.0, f64::exp)
     }
 
-    fn light_at_one(surroundings: &[f32], sun: Option<(&[f32], f64)>) -> Vec<f32> {
+    pub(super) fn light_at_one(surroundings: &[f32], sun: Option<(&[f32], f64)>) -> Vec<f32> {
         match sun {
             None => surroundings.to_vec(),
             Some((sun, ratio)) => (surroundings.iter().zip(sun))
@@ -116,7 +115,7 @@ impl Fitter<'_> {
         }
     }
 
-    fn log_light(&self, light_at_one: &[f32], scale: f64) -> Vec<f32> {
+    pub(super) fn log_light(&self, light_at_one: &[f32], scale: f64) -> Vec<f32> {
         let least = (scale * mean(light_at_one) * DARKEST) as f32;
         let least = least.max(f32::MIN_POSITIVE);
         (light_at_one.iter().zip(&self.fixed))
@@ -132,7 +131,7 @@ impl Fitter<'_> {
     }
 
     /// The strength of a sun among a few.
-    fn with_sun(&self, surroundings: &[f32], sun: &[f32]) -> (f64, Costs) {
+    fn roughly_with_sun(&self, surroundings: &[f32], sun: &[f32]) -> (f64, Costs) {
         let unit = mean(surroundings).max(1e-9) / mean(sun).max(1e-9);
         let tried = STRENGTHS.map(|strength| {
             let ratio = strength * unit;
@@ -143,6 +142,31 @@ impl Fitter<'_> {
             .into_iter()
             .min_by(|a, b| total(&a.1).total_cmp(&total(&b.1)));
         best.expect("some strength is tried")
+    }
+
+    /// The strength about that one which explains most: between those of [`STRENGTHS`] light is off by more than what is left of a good fit.
+    fn closer(
+        &self,
+        surroundings: &[f32],
+        sun: &[f32],
+        (mut ratio, mut costs): (f64, Costs),
+    ) -> (f64, Costs) {
+        let total = |costs: &Costs| costs.iter().sum::<f64>();
+        for step in CLOSER_STEPS {
+            for factor in [step.exp(), (-step).exp()] {
+                let tried = self.costs(surroundings, Some((sun, ratio * factor)));
+                if total(&tried) < total(&costs) {
+                    (ratio, costs) = (ratio * factor, tried);
+                    break;
+                }
+            }
+        }
+        (ratio, costs)
+    }
+
+    fn with_sun(&self, surroundings: &[f32], sun: &[f32]) -> (f64, Costs) {
+        let rough = self.roughly_with_sun(surroundings, sun);
+        self.closer(surroundings, sun, rough)
     }
 
     /// Surroundings that are none of the environment's.
@@ -202,25 +226,53 @@ impl Fitter<'_> {
         }
     }
 
+    /// Irradiance by the surroundings, the mean over the rotations that are known.
+    fn surroundings_of_all_rotations(&self) -> Vec<f32> {
+        let count = self.surroundings.len() as f32;
+        let points = 0..self.fixed.len();
+        let sum = |at: usize| self.surroundings.iter().map(|light| light[at]).sum::<f32>();
+        points.map(|at| sum(at) / count).collect()
+    }
+
     /// A sun in every direction above the horizon.
     pub fn suns(&self, rotation_deg: f64) -> Vec<Candidate> {
-        let surroundings = self.surroundings_at(rotation_deg);
-        (0..self.directions.len())
+        self.suns_under(&self.surroundings_at(rotation_deg), rotation_deg)
+    }
+
+    /// The same where nothing is known of the rotation: one that was chosen without a strong sun would stand in for it, and hide where it is.
+    pub fn suns_under_any_rotation(&self) -> Vec<Candidate> {
+        self.suns_under(&self.surroundings_of_all_rotations(), 0.0)
+    }
+
+    fn suns_under(&self, surroundings: &[f32], rotation_deg: f64) -> Vec<Candidate> {
+        let points = &self.grid.points;
+        let sunlight_of = |index: usize| self.openness.of_direction(points, self.directions, index);
+        let mut tried: Vec<(usize, f64, Costs)> = (0..self.directions.len())
             .into_par_iter()
             .filter(|index| self.directions[*index].y > LEAST_ELEVATION)
             .map(|index| {
-                let sunlight =
-                    self.openness
-                        .of_direction(&self.grid.points, self.directions, index);
-                let (ratio, costs) = self.with_sun(&surroundings, &sunlight);
-                let direction = self.directions[index];
-                Candidate {
-                    rotation_deg,
-                    sun: Some(Sun { direction, ratio }),
-                    costs,
-                }
+                let (ratio, costs) = self.roughly_with_sun(surroundings, &sunlight_of(index));
+                (index, ratio, costs)
             })
-            .collect()
+            .collect();
+        let total = |costs: &Costs| costs.iter().sum::<f64>();
+        tried.sort_by(|a, b| total(&a.2).total_cmp(&total(&b.2)));
+        let best = CLOSER.min(tried.len());
+        tried[..best]
+            .par_iter_mut()
+            .for_each(|(index, ratio, costs)| {
+                let rough = (*ratio, *costs);
+                (*ratio, *costs) = self.closer(surroundings, &sunlight_of(*index), rough);
+            });
+        let candidate = |(index, ratio, costs): (usize, f64, Costs)| Candidate {
+            rotation_deg,
+            sun: Some(Sun {
+                direction: self.directions[index],
+                ratio,
+            }),
+            costs,
+        };
+        tried.into_iter().map(candidate).collect()
     }
 
     /// The sun nearby that explains most: by steps that are halved where none helps.
@@ -273,132 +325,6 @@ impl Fitter<'_> {
             log_light,
         }
     }
-
-    /// Standard deviations: the sandwich of White (1980), with blocks of the photograph for independent errors (Liang and Zeger 1986), or materials
-    /// where albedos are known and that is more.
-    pub fn uncertainty(
-        &self,
-        (rotation_deg, turns): (f64, bool),
-        sun: Option<Sun>,
-        scale: f64,
-    ) -> Uncertainty {
-        let log_light = |rotation_deg: f64, sun: Option<Sun>, scale: f64| {
-            let surroundings = self.surroundings_at(rotation_deg);
-            let points = &self.grid.points;
-            let sunlight = sun.map(|sun| (sunlight(self.scene, points, sun.direction), sun.ratio));
-            let sun = sunlight.as_ref().map(|(light, ratio)| (&light[..], *ratio));
-            self.log_light(&Self::light_at_one(&surroundings, sun), scale)
-        };
-        let slope = |low: Vec<f32>, high: Vec<f32>, step: f64| -> Vec<f32> {
-            let pairs = low.iter().zip(&high);
-            pairs
-                .map(|(low, high)| (high - low) / (2.0 * step) as f32)
-                .collect()
-        };
-        let turned = |sun: Sun, axis: DVec3, degrees: f64| Sun {
-            direction: rotated(sun.direction, axis, degrees),
-            ..sun
-        };
-        let mut slopes = Vec::new();
-        let mut names = Vec::new();
-        if self.comparisons.are_absolute {
-            names.push(Parameter::LogScale);
-            let at = |factor: f64| log_light(rotation_deg, sun, scale * factor);
-            slopes.push(slope(at((-0.01f64).exp()), at(0.01f64.exp()), 0.01));
-        }
-        if turns {
-            names.push(Parameter::Rotation);
-            let at = |step: f64| log_light(rotation_deg + step, sun, scale);
-            slopes.push(slope(
-                at(-SLOPE_STEP_DEG),
-                at(SLOPE_STEP_DEG),
-                SLOPE_STEP_DEG,
-            ));
-        }
-        if let Some(sun) = sun {
-            names.push(Parameter::LogRatio);
-            let with = |sun: Sun| log_light(rotation_deg, Some(sun), scale);
-            let at = |factor: f64| {
-                let ratio = sun.ratio * factor;
-                with(Sun { ratio, ..sun })
-            };
-            slopes.push(slope(at((-0.05f64).exp()), at(0.05f64.exp()), 0.05));
-            let towards = sun.direction.as_dvec3();
-            let side = towards.cross(DVec3::Y).try_normalize().unwrap_or(DVec3::X);
-            for (parameter, axis) in [
-                (Parameter::Sideways, side.cross(towards)),
-                (Parameter::Upwards, side),
-            ] {
-                names.push(parameter);
-                let at = |step: f64| with(turned(sun, axis, step));
-                slopes.push(slope(
-                    at(-SLOPE_STEP_DEG),
-                    at(SLOPE_STEP_DEG),
-                    SLOPE_STEP_DEG,
-                ));
-            }
-        }
-        let centre = log_light(rotation_deg, sun, scale);
-        let sigmas = [Clusters::Blocks, Clusters::Materials].map(|clusters| {
-            if clusters == Clusters::Materials && !self.comparisons.are_absolute {
-                return None;
-            }
-            let sums = (self.comparisons).linearised(&centre, &slopes, self.sigma, clusters);
-            sandwich(&sums, names.len())
-        });
-        let of = |wanted: Parameter| {
-            let at = names.iter().position(|name| *name == wanted)?;
-            let told = sigmas.iter().flatten().map(|sigmas| sigmas[at]);
-            told.max_by(f64::total_cmp)
-        };
-        Uncertainty {
-            log_scale: of(Parameter::LogScale),
-            rotation_deg: of(Parameter::Rotation),
-            log_ratio: of(Parameter::LogRatio),
-            sun_deg: of(Parameter::Sideways)
-                .zip(of(Parameter::Upwards))
-                .map(|(a, b)| a.hypot(b)),
-        }
-    }
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Parameter {
-    LogScale,
-    Rotation,
-    LogRatio,
-    Sideways,
-    Upwards,
-}
-
-/// Standard deviations; `None`: not fitted, or not told by the photograph.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Uncertainty {
-    pub log_scale: Option<f64>,
-    pub rotation_deg: Option<f64>,
-    pub log_ratio: Option<f64>,
-    /// Of the direction, both ways together.
-    pub sun_deg: Option<f64>,
-}
-
-/// Standard deviations of the parameters; `None`: the comparisons do not tell them apart, or are too few clusters.
-fn sandwich(sums: &Linearised, n: usize) -> Option<Vec<f64>> {
-    let has_terms = |gradient: &&Vec<f64>| gradient.iter().any(|value| *value != 0.0);
-    let count = sums.gradients.iter().filter(has_terms).count();
-    if count < LEAST_CLUSTERS {
-        return None;
-    }
-
-    let normal = DMatrix::from_row_slice(n, n, &sums.normal);
-    let inverse = normal.cholesky()?.inverse();
-    let mut scatter = DMatrix::zeros(n, n);
-    for gradient in &sums.gradients {
-        let gradient = DVector::from_column_slice(gradient);
-        scatter += &gradient * gradient.transpose();
-    }
-    let correction = count as f64 / (count - 1) as f64;
-    let covariance = &inverse * scatter * &inverse * correction;
-    Some((0..n).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect())
 }
 
 /// Away from `direction` by `degrees`, on the side of `turn_deg`.
@@ -408,7 +334,7 @@ fn tilted(direction: Vec3, turn_deg: f64, degrees: f64) -> Vec3 {
     rotated(direction, axis, degrees)
 }
 
-fn rotated(direction: Vec3, axis: DVec3, degrees: f64) -> Vec3 {
+pub(super) fn rotated(direction: Vec3, axis: DVec3, degrees: f64) -> Vec3 {
     let turn = DMat3::from_axis_angle(axis, degrees.to_radians());
     (turn * direction.as_dvec3()).as_vec3().normalize()
 }

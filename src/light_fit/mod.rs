@@ -13,6 +13,7 @@ mod rays;
 mod residual;
 mod scene_edit;
 mod search;
+mod uncertainty;
 mod verdict;
 
 pub use residual::picture as residual_picture;
@@ -134,7 +135,12 @@ pub struct Shadows {
 impl LightFit {
     /// The photograph's shading is not that of the proxy under any such light.
     pub fn is_poor(&self) -> bool {
-        !self.gain.is_enough()
+        !self.gain.is_enough() || self.is_worse()
+    }
+
+    /// The scene's own light explains more.
+    pub fn is_worse(&self) -> bool {
+        self.explained.fitted < self.explained.as_given - 0.01
     }
 }
 

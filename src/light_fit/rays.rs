@@ -14,6 +14,8 @@ pub struct Openness {
     open: Vec<[u64; COUNT / 64]>,
     /// Irradiance from what of the proxy is met, as the photograph shows it.
     pub from_proxy: Vec<f32>,
+    /// The part of it that comes from where the camera does not see, and is taken to be as bright as the rest in the mean.
+    pub from_unseen: Vec<f32>,
 }
 
 fn ray(point: &Point, direction: Vec3) -> Ray {
@@ -36,10 +38,10 @@ fn cosine(point: &Point, direction: Vec3) -> f32 {
 
 impl Openness {
     pub fn of(scene: &PackedScene, grid: &Grid, directions: &[Vec3]) -> Self {
-        let found: Vec<([u64; COUNT / 64], f32)> = (grid.points.par_iter())
+        let found: Vec<([u64; COUNT / 64], [f32; 2])> = (grid.points.par_iter())
             .map(|point| {
                 let mut open = [0; COUNT / 64];
-                let mut from_proxy = 0.0;
+                let (mut from_seen, mut from_unseen) = (0.0, 0.0);
                 for (i, direction) in directions.iter().enumerate() {
                     let cosine = cosine(point, *direction);
                     if cosine == 0.0 {
@@ -48,17 +50,27 @@ impl Openness {
                     let hit = scene.real_bvh.closest(&ray(point, *direction));
                     if hit.is_hit() {
                         let there = point.origin + *direction * hit.t;
-                        let shown = grid.luminance_at(&scene.frame, there);
-                        from_proxy += cosine * shown.unwrap_or(grid.mean_luminance);
+                        match grid.luminance_at(&scene.frame, there) {
+                            Some(shown) => from_seen += cosine * shown,
+                            None => from_unseen += cosine * grid.mean_luminance,
+                        }
                     } else {
                         open[i / 64] |= 1 << (i % 64);
                     }
                 }
-                (open, from_proxy * SOLID_ANGLE)
+                let from_proxy = from_seen + from_unseen;
+                (
+                    open,
+                    [from_proxy, from_unseen].map(|light| light * SOLID_ANGLE),
+                )
             })
             .collect();
-        let (open, from_proxy) = found.into_iter().unzip();
-        Self { open, from_proxy }
+        let (open, light): (_, Vec<[f32; 2]>) = found.into_iter().unzip();
+        Self {
+            open,
+            from_proxy: light.iter().map(|[all, _]| *all).collect(),
+            from_unseen: light.iter().map(|[_, unseen]| *unseen).collect(),
+        }
     }
 
     fn is_open(&self, point: usize, direction: usize) -> bool {

@@ -30,6 +30,9 @@ const ROTATION_UNKNOWN_ALBEDO_DEG: f64 = 6.0;
 const SUN_GRID_DEG: f64 = 0.5;
 /// The same of the scale, relative: maps of known scale came out 0.3 to 0.8% off where all albedos were right.
 const SCALE_GRID: f64 = 0.005;
+/// Spread of ln of luminance that a search allows for at the least where albedos are known: most points of a floor in the sun are alike to a hundredth,
+/// and so narrow a cost counts a shadow that lies between two directions no less than one that is not there.
+const LEAST_SPREAD: f64 = 0.2;
 /// What a watcher hears of: rays, irradiances, the rounds, and what is kept.
 const STEPS: u64 = 4 + 2 * ROUNDS as u64 + 4;
 /// One point of so many counts as shadowed.
@@ -150,23 +153,25 @@ impl Search<'_> {
             let flat = vec![off as f32; flat.len()];
             self.fitter.comparisons.spread(&flat)
         };
+        self.fitter.sigma = self.fitter.sigma.max(self.least_sigma());
         let (given, basis) = self.as_given();
         let given_deg = self.environment.rotation_deg;
         let turns = self.fitter.surroundings.len() > 1 && !self.keeps_rotation;
         let mut rotation_deg = given_deg;
-        if turns {
-            rotation_deg = least(&self.fitter.rotations(None)).rotation_deg;
-        }
         let mut suns = Vec::new();
-        for _ in 0..ROUNDS {
-            suns = self.fitter.suns(rotation_deg);
+        for round in 0..ROUNDS {
+            suns = match turns && round == 0 {
+                true => self.fitter.suns_under_any_rotation(),
+                false => self.fitter.suns(rotation_deg),
+            };
             meter.add(1);
-            let best = least(&suns).clone();
-            self.fitter.sigma = self.spread_of(&best);
+            let mut best = least(&suns).clone();
             if turns {
                 let turned = self.fitter.rotations(best.sun.map(|sun| sun.direction));
-                rotation_deg = least(&turned).rotation_deg;
+                best = least(&turned).clone();
+                rotation_deg = best.rotation_deg;
             }
+            self.fitter.sigma = self.spread_of(&best).max(self.least_sigma());
             meter.add(1);
         }
         // With the last spread, costs are comparable.
@@ -340,6 +345,14 @@ impl Search<'_> {
         });
         let sun = light.as_ref().map(|(light, ratio)| (&light[..], *ratio));
         self.fitter.strengths(&surroundings, sun)
+    }
+
+    /// In textures.
+    fn least_sigma(&self) -> f64 {
+        match self.fitter.comparisons.are_absolute {
+            true => LEAST_SPREAD / self.fitter.comparisons.typical_texture.max(1e-3),
+            false => 0.0,
+        }
     }
 
     fn spread_of(&self, candidate: &Candidate) -> f64 {

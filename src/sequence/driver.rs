@@ -342,7 +342,11 @@ impl Sequence<'_> {
         self.frames.moving += u32::from(renderer.is_moving());
         self.non_finite_samples += renderer.film().non_finite_samples();
         for note in renderer.notes().iter().skip(started.notes) {
-            (self.hear)(&Event::Note(note.to_string()));
+            // Frames that differ in its figures alone do not say it again.
+            let figures = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-');
+            if self.told.insert(note.replace(figures, "")) {
+                (self.hear)(&Event::Note(note.to_string()));
+            }
         }
         started.notes = renderer.notes().len();
         if self.frames.rendered == 1 {

@@ -66,7 +66,7 @@ impl Session {
             -size.z
         ));
         line(format_args!(
-            "\n[[virtual]]\nshape = \"box\"\nname = \"box\"\nsize = [{side:.4}, {side:.4}, {side:.4}]\ntranslation = [{:.4}, {:.4}, {:.4}]\nmaterial = {{ base_color = [0.60, 0.08, 0.05], roughness = 0.4 }}\n\n[render]\nrays_per_pixel = 16\n",
+            "\n[[virtual]]\nshape = \"box\"\nname = \"box\"\nsize = [{side:.4}, {side:.4}, {side:.4}]\ntranslation = [{:.4}, {:.4}, {:.4}]\nmaterial = {{ base_color = [0.60, 0.08, 0.05], roughness = 0.4 }}\n\n[render]\nrays_per_pixel = 16\ncomposite = \"quotient\"               # shadows whatever the light's strength, which is guessed\n",
             middle.x,
             middle.y + 0.5 * side + 1e-4,
             middle.z

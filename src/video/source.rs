@@ -169,7 +169,7 @@ impl FrameSource {
             VideoFrame {
                 photo: Photo::from_srgb8(header.width, header.height, codes),
                 pixels: Pixels::Planes(planes),
-                warnings: Vec::new(),
+                warnings: header.warning().into_iter().collect(),
             }
         };
         self.next_as(wanted, of_planes, |frame| frame)

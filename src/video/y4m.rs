@@ -133,6 +133,17 @@ impl Header {
         })
     }
 
+    /// What of the stream is passed over; `None`: nothing.
+    pub(super) fn warning(&self) -> Option<String> {
+        let word = (self.line.split_ascii_whitespace()).find_map(|word| word.strip_prefix('A'))?;
+        let (wide, high) = parse_rate(word)?;
+        (wide != high).then(|| {
+            format!(
+                "its pixels are {wide}:{high} as wide as high and are taken for square; scale it (ffmpeg -vf scale=iw*sar:ih,setsar=1)"
+            )
+        })
+    }
+
     /// "BT.601, limited range".
     pub fn colours(&self) -> String {
         let range = if self.full_range { "full" } else { "limited" };
@@ -218,7 +229,13 @@ impl<R: Read> Y4mReader<R> {
         }
         let is_begun = MAGIC.as_bytes().starts_with(&begin);
         if !is_begun && !begin.starts_with(MAGIC.as_bytes()) {
-            return Err(place.error(NO_SIGN));
+            let is_mime = begin.starts_with(b"--") || begin.starts_with(b"\r\n--");
+            let is_http = begin.starts_with(b"HTTP/") || begin.starts_with(b"Content-");
+            let problem = match is_mime || is_http {
+                true => MIME,
+                false => NO_SIGN,
+            };
+            return Err(place.error(problem));
         }
         let mut input_from_start = begin.as_slice().chain(&mut input);
         let line = read_line(&mut input_from_start, &place)?.ok_or_else(|| {
@@ -373,6 +390,9 @@ impl<R: Read> Y4mReader<R> {
         Ok(Some(Planes { planes, problem }))
     }
 }
+
+/// As network cameras send them: `multipart/x-mixed-replace`.
+const MIME: &str = "it is a stream of JPEG pictures with MIME headers between them, no Y4M stream; expected frames without them; convert it with `ffmpeg -f mpjpeg -i STREAM -pix_fmt yuv420p -f yuv4mpegpipe -`";
 
 const NO_SIGN: &str = "it does not begin with YUV4MPEG2; expected a Y4M stream; make one with `ffmpeg -i VIDEO -pix_fmt yuv420p -f yuv4mpegpipe -`";
 

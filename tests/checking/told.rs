@@ -99,6 +99,18 @@ fn the_sun_of_an_environment_is_found_where_it_stands() {
         "{sun}"
     );
     assert!(sun.contains("towards [0.740, 0.672, 0.036]"), "{sun}");
+    // A sky without a sun, and one without anything.
+    for (peak, told) in [(1.0, "brightest"), (0.0, "range")] {
+        let file = std::fs::File::create(folder.path("sky.hdr")).expect("creates");
+        let encoder = image::codecs::hdr::HdrEncoder::new(file);
+        let floor = if peak > 0.0 { 0.25 } else { 0.0 };
+        texels.fill(image::Rgb([floor; 3]));
+        texels[8 * width + 48] = image::Rgb([peak; 3]);
+        encoder.encode(&texels, width, height).expect("writes");
+        let said = folder.succeed("info sky.hdr");
+        assert!(said.contains(&format!("\n{told}")), "{said}");
+        assert!(!said.contains("\nsun") && !said.contains("inf"), "{said}");
+    }
 }
 
 #[test]

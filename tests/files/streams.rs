@@ -209,6 +209,34 @@ fn y4m_frames_that_are_cut_off() {
 }
 
 #[test]
+fn y4m_pixels_that_are_not_square_are_told() {
+    let folder = folder();
+    for (aspect, is_told) in [("A1:1", false), ("A0:0", false), ("A64:45", true)] {
+        let film = y4m(None);
+        let (head, frames) = film.split_at(film.iter().position(|b| *b == b'\n').expect("a line"));
+        let head = String::from_utf8_lossy(head).replace("A1:1", aspect);
+        folder.write("in.y4m", [head.as_bytes(), frames].concat());
+        let said = folder.sequence_of("in.y4m", "t.txt", "");
+        assert_eq!(
+            said.matches("64:45 as wide as high").count(),
+            usize::from(is_told),
+            "{said}"
+        );
+    }
+}
+
+/// As network cameras send their pictures.
+#[test]
+fn jpegs_with_mime_headers_are_told_their_name() {
+    let folder = folder();
+    let head = "--frame\r\nContent-Type: image/jpeg\r\nContent-Length: 4\r\n\r\n";
+    folder.write("in.mjpeg", head);
+    folder.refuse_sequence_of("in.mjpeg", "t.txt", "with MIME headers");
+    folder.write("in.mjpeg", "-frame\r\n");
+    folder.refuse_sequence_of("in.mjpeg", "t.txt", "does not begin with YUV4MPEG2");
+}
+
+#[test]
 fn y4m_bt709() {
     let folder = folder();
     folder.write("in.y4m", y4m(None));

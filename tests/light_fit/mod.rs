@@ -94,14 +94,17 @@ fn folder() -> Folder {
     folder
 }
 
-fn sunny(folder: &Folder) {
+fn sun_over(sky: f64, irradiance: f64) -> String {
     let sun = SUN.map(|x| -x);
-    let light = format!(
+    format!(
         "{}[[light]]\nkind = \"directional\"\nside = \"virtual\"\ndirection = {sun:?}\nirradiance = {:?}\n\n",
-        environment(ROTATION_DEG, SCALE),
-        [IRRADIANCE; 3]
-    );
-    photograph(folder, &light, "photo.png");
+        environment(ROTATION_DEG, sky),
+        [irradiance; 3]
+    )
+}
+
+fn sunny(folder: &Folder) {
+    photograph(folder, &sun_over(SCALE, IRRADIANCE), "photo.png");
 }
 
 fn number(value: &Value) -> f64 {
@@ -145,6 +148,45 @@ fn sun_and_rotation_are_found() {
     let text = folder.read("fitted.toml");
     assert_eq!(text.matches("[[light]]").count(), 1, "{text}");
     assert!(off_sun_deg(&folder.json("again.json")) < 3.0);
+}
+
+const STRONG_OVER_SKY: f64 = 10.0;
+
+/// Of a photograph of 96 x 72 pixels under a sun that is ten times as strong as the room's light.
+fn strong_sun(known: bool) -> Value {
+    let folder = folder();
+    let sky = 0.25;
+    photograph(&folder, &sun_over(sky, STRONG_OVER_SKY * sky), "photo.png");
+    let begin = environment(10.0, 1.0);
+    folder.write("scene.toml", scene("photo.png", &begin, known));
+    folder.run("light fit scene.toml --stats fit.json");
+    folder.json("fit.json")
+}
+
+fn assert_strong_sun(fit: &Value) {
+    let off = off_sun_deg(fit);
+    assert!(off < 4.0, "{off} degrees: {fit:#}");
+    let share = number(&fit["sun"]["irradiance"]) / number(&fit["scale"]["is"]);
+    assert!((share / STRONG_OVER_SKY - 1.0).abs() < 0.25, "{share}");
+    assert!(
+        (share / (1.6 * STRONG_OVER_SKY) - 1.0).abs() > 0.25,
+        "control"
+    );
+}
+
+#[test]
+fn a_strong_sun_in_a_small_photograph_is_as_strong_as_it_is() {
+    let fit = strong_sun(false);
+    assert_eq!(fit["poor"], false, "{fit:#}");
+    assert_strong_sun(&fit);
+}
+
+/// Its strength over the sky's is not told well there.
+#[test]
+fn a_strong_sun_over_known_albedos_stands_where_it_stands() {
+    let fit = strong_sun(true);
+    let off = off_sun_deg(&fit);
+    assert!(off < 4.0, "{off} degrees: {fit:#}");
 }
 
 #[test]

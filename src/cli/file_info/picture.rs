@@ -26,6 +26,9 @@ const TAGS: [(&str, Tag); 7] = [
     ("sensitivity", Tag::PhotographicSensitivity),
 ];
 
+/// What is this many times as bright as its map in the mean, and up, is its sun or a lamp.
+const SUN: f64 = 20.0;
+
 pub(super) fn describe(path: &Path, name: &str, report: &mut Report) -> Result<(), Failure> {
     if name.contains("OpenEXR")
         && let Ok((film, note)) = read_film(path)
@@ -110,6 +113,10 @@ fn of_light(image: &ImageFile, pixels: &[[f32; 3]], report: &mut Report) {
         .filter(|l| *l > 0.0)
         .fold(f32::INFINITY, f32::min);
     let peak = light(brightest);
+    if peak <= 0.0 {
+        report.line("range", "linear, black all over");
+        return;
+    }
     let stops = f64::from(peak / dark).log2();
     report.line(
         "range",
@@ -125,8 +132,13 @@ fn of_light(image: &ImageFile, pixels: &[[f32; 3]], report: &mut Report) {
     let (azimuth, elevation) = ((across - 0.5) * TAU, (0.5 - down) * PI);
     let flat = elevation.cos();
     let towards = [flat * azimuth.sin(), elevation.sin(), -flat * azimuth.cos()];
-    report.line("sun", format!(
+    let times = f64::from(peak) / mean;
+    let what = match times >= SUN && elevation > 0.0 {
+        true => "sun",
+        false => "brightest",
+    };
+    report.line(what, format!(
         "{:.0} times the mean, {:.1} degrees high, {:.1} right of the centre: towards [{:.3}, {:.3}, {:.3}] at rotation_deg = 0",
-        f64::from(peak) / mean, elevation.to_degrees(), azimuth.to_degrees(), towards[0], towards[1], towards[2]
+        times, elevation.to_degrees(), azimuth.to_degrees(), towards[0], towards[1], towards[2]
     ));
 }

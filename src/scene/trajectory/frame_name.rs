@@ -89,11 +89,10 @@ impl Naming {
         else {
             return Self::inner(stems);
         };
-        let units = [1e9, 1e6, 1e3];
-        let of_epoch = |unit: &f64| {
-            (numbers.iter()).all(|number| EPOCH_SECS.contains(&(*number as f64 / unit)))
-        };
-        if let Some(unit) = units.into_iter().find(of_epoch) {
+        let mut units = numbers.iter().map(|number| unit_of_epoch(*number));
+        if let Some(Some(unit)) = units.next()
+            && units.all(|other| other == Some(unit))
+        {
             return Self::Stamps(unit);
         }
         numbers.sort_unstable();
@@ -166,6 +165,12 @@ impl Naming {
             order.then_with(|| a.cmp(b))
         });
     }
+}
+
+/// How many to a second, of a whole number that is Unix time in milli-, micro- or nanoseconds.
+pub(super) fn unit_of_epoch(number: u64) -> Option<f64> {
+    let units = [1e9, 1e6, 1e3];
+    (units.into_iter()).find(|unit| EPOCH_SECS.contains(&(number as f64 / unit)))
 }
 
 pub(super) fn file_name(path: &str) -> &str {

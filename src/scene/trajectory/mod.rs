@@ -222,8 +222,12 @@ fn finite(x: f64, what: &str) -> std::result::Result<f64, String> {
     if x.abs() <= super::reader::MAX_MAGNITUDE {
         return Ok(x);
     }
+    let expected = match x.is_finite() {
+        true => format!("a number of at most {:e}", super::reader::MAX_MAGNITUDE),
+        false => "a finite number".to_owned(),
+    };
     Err(format!(
-        "{what} is {x}; expected a finite number; correct it, or give the pose as null so that its frame passes through"
+        "{what} is {x}; expected {expected}; correct it, or give the pose as null so that its frame passes through"
     ))
 }
 

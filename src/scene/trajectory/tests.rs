@@ -282,6 +282,17 @@ fn colmap_and_tum_turn_their_axes() {
         "no pose near"
     );
 
+    // Unix time in nanoseconds, as recorders of robots write it.
+    let nano = "1403636579963555584 0 0 0 0 0 0 1\n1403636580013555456 2 0 0 0 0 0 1\n";
+    let nano = folder.read("nano.txt", nano).expect("reads");
+    let secs = |at: usize| nano.entries[at].time_secs.expect("has one");
+    assert!((secs(0) - 1_403_636_579.963_555_6).abs() < 1e-6);
+    assert!((secs(1) - secs(0) - 0.05).abs() < 1e-6);
+    folder.refused(
+        "tum.txt",
+        "1e18 0 0 0 0 0 0 1\n",
+        "expected a number of at most 1e15",
+    );
     folder.refused("tum.txt", "1 0 0 0 0 0 0\n", "complete the line");
     folder.refused("tum.txt", "1 0 0 nan 0 0 0 1\n", "NaN");
     folder.refused("tum.txt", "1 0 0 0 0 0 0 2\n", "length 2");

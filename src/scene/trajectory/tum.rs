@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::{DQuat, DVec3};
 
+use super::frame_name::unit_of_epoch;
 use super::{
     Entry, EntryKey, Result, Trajectory, from_opencv_axes, line_error, numbers, pose_of_quaternion,
 };
@@ -49,7 +50,12 @@ fn read_line(words: &[&str], place: u32, number: usize) -> std::result::Result<E
             words.len()
         ));
     }
-    let [time, x, y, z, qx, qy, qz, qw] = numbers::<8>(words, form)?;
+    let mut words = words.to_vec();
+    let secs = words.first().and_then(|stamp| secs_of_epoch(stamp));
+    if let (Some(secs), [stamp, ..]) = (&secs, &mut words[..]) {
+        *stamp = secs;
+    }
+    let [time, x, y, z, qx, qy, qz, qw] = numbers::<8>(&words, form)?;
     let quaternion = DQuat::from_xyzw(qx, qy, qz, qw);
     let pose = pose_of_quaternion(quaternion, DVec3::new(x, y, z))?;
     Ok(Entry {
@@ -60,6 +66,12 @@ fn read_line(words: &[&str], place: u32, number: usize) -> std::result::Result<E
         intrinsics: None,
         focus_distance_m: None,
     })
+}
+
+/// Seconds, of Unix time in whole milli-, micro- or nanoseconds, as recorders of robots write it.
+fn secs_of_epoch(stamp: &str) -> Option<String> {
+    let number: u64 = stamp.parse().ok()?;
+    Some((number as f64 / unit_of_epoch(number)?).to_string())
 }
 
 /// What is written in lines of so many numbers, of which the first eight would pass for a pose.
