@@ -56,14 +56,6 @@ fn env_texel(scene: &PackedScene, i: u32, j: u32) -> Vec3 {
     )
 }
 
-/// Upper and lower edge of a row of cells, as v; the CPU looks them up ([`RowEdge`](super::environment_table::RowEdge)).
-pub(super) fn row_edges(row: f32, height: f32) -> (f32, f32) {
-    (
-        ((row - 0.5) / height).max(0.0),
-        ((row + 0.5) / height).min(1.0),
-    )
-}
-
 fn env_neighbours(scene: &PackedScene, u: f32, v: f32) -> Neighbours {
     let width = scene.frame.env_width;
     let height = scene.frame.env_height;
@@ -86,7 +78,7 @@ fn env_neighbours(scene: &PackedScene, u: f32, v: f32) -> Neighbours {
 }
 
 /// Sine of half the angle from the zenith to a row's v.
-pub(super) fn half_sin(v: f32) -> f32 {
+fn half_sin(v: f32) -> f32 {
     sincos_2pi(0.25 * v).0
 }
 

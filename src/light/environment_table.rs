@@ -2,19 +2,8 @@
 
 use glam::Vec3;
 
-use super::environment::{half_sin, row_edges};
 use crate::math::{luminance, sincos_2pi};
-
-/// The upper edge of a row of cells, and what follows from it alone. Zenith angles are in units of pi, as v is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RowEdge {
-    pub v: f32,
-    /// Squared sine and cosine of half the angle from the zenith: each is precise at its own pole.
-    pub sin2: f32,
-    pub cos2: f32,
-    /// Half the difference of the cosines of the row's edges.
-    pub half_height: f32,
-}
+use crate::packed::RowEdge;
 
 /// Cumulative distributions for sampling a map by brightness.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -82,19 +71,21 @@ pub fn environment_table(width: u32, height: u32, texels: &[f32]) -> Environment
 }
 
 fn edges_of_rows(height: u32) -> Vec<RowEdge> {
-    (0..height + 2)
-        .map(|row| {
-            let (upper, lower) = row_edges(row as f32, height as f32);
-            let v = upper.min(1.0);
-            let (sin, cos) = sincos_2pi(0.25 * v);
-            RowEdge {
-                v,
-                sin2: sin * sin,
-                cos2: cos * cos,
-                half_height: half_sin(upper + lower) * half_sin(lower - upper),
-            }
-        })
-        .collect()
+    let height = height as f32;
+    let rows = (0..height as u32 + 2).map(|row| row as f32);
+    let half_sin = |angle: f32| sincos_2pi(0.25 * angle).0;
+    rows.map(|row| {
+        let upper = ((row - 0.5) / height).clamp(0.0, 1.0);
+        let lower = ((row + 0.5) / height).min(1.0);
+        let (sin, cos) = sincos_2pi(0.25 * upper);
+        RowEdge {
+            v: upper,
+            sin2: sin * sin,
+            cos2: cos * cos,
+            half_height: half_sin(upper + lower) * half_sin(lower - upper),
+        }
+    })
+    .collect()
 }
 
 /// Running sums scaled to end at exactly 1; uniform where all weights are zero.

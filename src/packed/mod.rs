@@ -3,15 +3,16 @@
 //! The records are declared for both sides at once ([`records`], [`crate::shared`]).
 //! Triangle ids are global: real triangles come first (`0..Frame::real_triangle_count`), then virtual ones that rest, then those that move.
 
+mod environment;
 pub(crate) mod materials;
 pub(crate) mod records;
 mod triangles;
 
+pub use environment::RowEdge;
 pub use materials::Material;
 pub use records::*;
 
 use crate::accel::{Cover, WorldBvh};
-use crate::light::environment_table::RowEdge;
 pub use crate::shared::NONE;
 
 /// What a backend renders.
