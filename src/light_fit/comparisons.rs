@@ -78,7 +78,17 @@ pub fn fold_of(block: usize) -> usize {
 }
 
 impl Comparisons {
+    /// Points whose albedo is known by themselves, the others with each other.
     pub fn of(grid: &Grid) -> Self {
+        Self::asking(grid, |at| grid.points[at].albedo.is_some())
+    }
+
+    /// All points with each other, as if no albedo were known.
+    pub fn of_pairs(grid: &Grid) -> Self {
+        Self::asking(grid, |_| false)
+    }
+
+    fn asking(grid: &Grid, is_known: impl Fn(usize) -> bool) -> Self {
         let mut terms = Vec::new();
         let mut texture = textures(grid);
         for (a, point) in grid.points.iter().enumerate() {
@@ -93,7 +103,7 @@ impl Comparisons {
                 block: block as u16,
                 material: point.material,
             };
-            if point.albedo.is_some() {
+            if is_known(a) {
                 terms.push(term(KNOWN, point.log_shown(), 1.0, texture[a]));
                 continue;
             }
@@ -105,7 +115,7 @@ impl Comparisons {
                 let there = place.and_then(|(x, y)| grid.point_of_cell[y * grid.width + x]);
                 let Some(b) = there else { continue };
                 let other = &grid.points[b as usize];
-                if other.albedo.is_some() {
+                if is_known(b as usize) {
                     continue;
                 }
                 let (here, there) = (point.chromaticity(), other.chromaticity());

@@ -169,6 +169,23 @@ impl Fitter<'_> {
         self.closer(surroundings, sun, rough)
     }
 
+    /// By how much the strength of the sun over the surroundings, and the scale, are others where points are compared with each other alone; ln.
+    pub fn off_by_pairs(&self, surroundings: &[f32], sun: &[f32], ratio: f64) -> [f64; 2] {
+        let comparisons = &Comparisons::of_pairs(self.grid);
+        let light = Self::light_at_one(surroundings, Some((sun, ratio)));
+        let pairs = Fitter {
+            sigma: comparisons.spread(&self.log_light(&light, self.scale_of_mean(&light))),
+            comparisons,
+            surroundings: Vec::new(),
+            fixed: self.fixed.clone(),
+            ..*self
+        };
+        let rough = pairs.with_sun(surroundings, sun).0;
+        let other = pairs.strengths(surroundings, Some((sun, rough))).ratio;
+        let other_light = Self::light_at_one(surroundings, Some((sun, other)));
+        [other / ratio, mean(&light) / mean(&other_light)].map(f64::ln)
+    }
+
     /// Surroundings that are none of the environment's.
     pub fn of_light(&self, surroundings: &[f32]) -> Candidate {
         Candidate {

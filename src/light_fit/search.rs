@@ -221,6 +221,7 @@ impl Search<'_> {
         let errors = self
             .fitter
             .uncertainty((rotation_deg, turns), sun, strengths.scale);
+        let [off_ratio, off_scale] = self.off_by_pairs(rotation_deg, sun);
         let scale = self.scene_scale(strengths.scale);
         let model_deg = match self.fitter.comparisons.are_absolute {
             true => ROTATION_GRID_DEG,
@@ -235,7 +236,7 @@ impl Search<'_> {
                 is: scale,
                 sigma: errors
                     .log_scale
-                    .map(|sigma| sigma.hypot(SCALE_GRID) * scale),
+                    .map(|sigma| sigma.hypot(SCALE_GRID).hypot(off_scale) * scale),
                 is_kept: basis == ScaleBasis::Exposure,
             },
             scale_basis: basis,
@@ -252,7 +253,7 @@ impl Search<'_> {
                 direction: -sun.direction.as_dvec3(),
                 irradiance: scale * sun.ratio,
                 direction_sigma_deg: errors.sun_deg.map(|sigma| sigma.hypot(SUN_GRID_DEG)),
-                irradiance_sigma: errors.log_ratio,
+                irradiance_sigma: errors.log_ratio.map(|sigma| sigma.hypot(off_ratio)),
             }),
             gain_of_sun,
             gain_of_rotation,
@@ -345,6 +346,16 @@ impl Search<'_> {
         });
         let sun = light.as_ref().map(|(light, ratio)| (&light[..], *ratio));
         self.fitter.strengths(&surroundings, sun)
+    }
+
+    /// Where albedos are known: what two ways to tell the strength of a sun differ by. Their errors have causes of their own.
+    fn off_by_pairs(&self, rotation_deg: f64, sun: Option<Sun>) -> [f64; 2] {
+        let Some(sun) = sun.filter(|_| self.fitter.comparisons.are_absolute) else {
+            return [0.0; 2];
+        };
+        let sunlight = sunlight(self.fitter.scene, &self.fitter.grid.points, sun.direction);
+        let surroundings = self.fitter.surroundings_at(rotation_deg);
+        (self.fitter).off_by_pairs(&surroundings, &sunlight, sun.ratio)
     }
 
     /// In textures.
