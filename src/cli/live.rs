@@ -11,7 +11,7 @@ use super::threads::ThreadsFlag;
 use super::track_values::{Chosen, Gamma, family, gamma};
 use super::values::{above_zero, choice, rays_per_pixel};
 use super::{Failure, Outcome, interrupt, say};
-use crate::live::{LiveEvent, LiveOptions, LiveStats, run_live};
+use crate::live::{LiveEvent, LiveOptions, run_live};
 use crate::output::{check_writable_as, write_text};
 use crate::renderer::Watcher;
 use crate::scene::{BackendChoice, Overrides};
@@ -121,7 +121,7 @@ fn tell(event: &LiveEvent<'_>) {
 fn run_in_window(
     arguments: &Arguments,
     cancelled: &(dyn Fn() -> bool + Sync),
-) -> Result<LiveStats, Failure> {
+) -> Result<crate::live::LiveStats, Failure> {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicBool, Ordering};
 
