@@ -335,7 +335,7 @@ impl eframe::App for App {
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
     #[error(
-        "the window cannot be opened: {0}; expected a display and a graphics driver (on Linux Vulkan, such as Mesa's); or use --headless-script, or of a stream its output"
+        "the window cannot be opened: {0}; expected a display and a graphics driver (on Linux Vulkan, such as Mesa's); or do without it: `mixray preview --headless-script`, `mixray live -o`"
     )]
     Open(String),
     #[error("threads cannot be started: {0}")]

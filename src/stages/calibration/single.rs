@@ -5,6 +5,8 @@
 //! level (grass, gravel, fabric) stands out where other levels have flat blocks (`textured`); where none has, it is taken for noise: a calibration from
 //! several frames tells them apart, one photograph cannot.
 
+mod textured;
+
 use rayon::prelude::*;
 
 use super::estimate::{Sum, fill_from_neighbours, fit_levels, squared_lags};
@@ -345,8 +347,6 @@ fn together(bins: &[NoiseBin]) -> NoiseBin {
     }
     bin
 }
-
-mod textured;
 
 #[cfg(test)]
 mod tests;
