@@ -178,13 +178,6 @@ fn kill(commands: &[Killed], times: u32) {
 }
 
 #[test]
-fn kills_leave_nothing_broken() {
-    kill(&COMMANDS[..4], 5);
-}
-
-/// 204 kills: `cargo test --release -- --ignored killed_two_hundred_times`.
-#[test]
-#[ignore = "minutes"]
 fn killed_two_hundred_times() {
     kill(COMMANDS, 34);
 }
