@@ -1,6 +1,7 @@
 //! What photons are sent to and from which lights.
 
 use std::collections::HashMap;
+use std::f64::consts::PI;
 
 use glam::Vec3;
 
@@ -91,6 +92,15 @@ impl PackedScene {
         if self.frame.env_light != NONE && powers[self.frame.env_light as usize] > 0.0 {
             self.frame.env_traced_above = self.env_traced.above as f32;
         }
+        let radius = |light: &Light| {
+            let shown = spheres.iter().map(|s| solid_angle_of(light, xyz(*s)));
+            let largest = match light.kind {
+                LIGHT_ENVIRONMENT => self.env_traced.solid_angle_sr,
+                _ => shown.fold(0.0, f64::max),
+            };
+            f64::from(light.photon_pdf) * (largest / PI).sqrt()
+        };
+        self.photon_light_radius = self.lights.iter().map(radius).sum::<f64>() as f32;
     }
 
     /// Whether each light, or the object that it is a part of, shows so large at some sphere that the eye's paths find it as well as photons do.
@@ -125,7 +135,7 @@ impl PackedScene {
 
     /// Estimate of the power that a light sends to the spheres; 0 where it sends no photons.
     fn power_towards(&self, light: &Light, spheres: &[[f32; 4]]) -> f64 {
-        use std::f64::consts::{PI, TAU};
+        use std::f64::consts::TAU;
         let brightness = f64::from(luminance(xyz(light.radiance)));
         let discs: f64 = spheres.iter().map(|s| PI * f64::from(s[3]).powi(2)).sum();
         let solid_angles = |from: Vec3| -> f64 {
@@ -221,17 +231,21 @@ pub(super) fn traced_environment(
     mean: f64,
 ) -> TracedEnvironment {
     let above = TRACED_ABOVE_MEAN * mean;
-    let (mut sum, mut area) = (0.0, 0.0);
+    let (mut sum, mut area, mut brighter) = (0.0, 0.0, 0.0);
     for (row, texels) in texels.chunks(3 * width as usize).enumerate() {
-        let middle = (row as f64 + 0.5) / f64::from(height) * std::f64::consts::PI;
+        let middle = (row as f64 + 0.5) / f64::from(height) * PI;
         for texel in texels.chunks(3) {
             let brightness = f64::from(luminance(Vec3::from_slice(texel))) * scale;
             sum += (brightness - above).max(0.0) * middle.sin();
             area += middle.sin();
+            if brightness > above {
+                brighter += middle.sin();
+            }
         }
     }
     TracedEnvironment {
         above,
         mean_radiance: sum / area.max(1e-30),
+        solid_angle_sr: 4.0 * PI * brighter / area.max(1e-30),
     }
 }

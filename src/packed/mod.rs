@@ -67,6 +67,8 @@ pub struct PackedScene {
     pub(crate) object_covers: Option<Vec<ObjectCover>>,
     pub(crate) env_mean_luminance: f64,
     pub(crate) env_traced: TracedEnvironment,
+    /// Half-angle at which the lights that send photons show at smooth objects, radians: a mean by their shares, of each at its largest.
+    pub(crate) photon_light_radius: f32,
     /// Photons traced for every ray per pixel; 0 where none are.
     pub photons_per_ray: u64,
 }
@@ -78,6 +80,8 @@ pub struct TracedEnvironment {
     pub above: f64,
     /// Luminance of what lies above it, mean over the sphere.
     pub mean_radiance: f64,
+    /// Of the directions where it is brighter.
+    pub solid_angle_sr: f64,
 }
 
 /// Spheres about a virtual object, in its own space.
@@ -132,6 +136,7 @@ impl PackedScene {
             object_covers: None,
             env_mean_luminance: 0.0,
             env_traced: TracedEnvironment::default(),
+            photon_light_radius: 0.0,
             photons_per_ray: 0,
         }
     }

@@ -17,10 +17,12 @@ const MOST: u32 = 1 << 16;
 const CELL_OF_RADIUS: f32 = 0.25;
 /// Landings of a cell that are looked at.
 const LANDINGS: usize = 128;
-/// Half-angles of lobes, radians: the narrowest, that of a lone landing, and the widest.
+/// Half-angles of lobes, radians: the narrowest and the widest.
 const NARROWEST: f32 = 0.03;
-const LONE: f32 = 0.12;
 const WIDEST: f32 = 0.6;
+/// That of a lobe of one landing, in those at which lights show, and at the most.
+const LONE_OF_LIGHT: f32 = 3.0;
+const LONE_WIDEST: f32 = 0.3;
 /// A lobe reaches this much further than the landings that it was made for.
 const WIDENING: f32 = 1.25;
 const MOST_CELLS: usize = 1 << 15;
@@ -68,7 +70,10 @@ pub fn learn(scene: &mut PackedScene) {
     for landings in cells {
         let first = guide_cell(scene, landings[0].position) as usize;
         if scene.guide[first][3] == 0.0 {
-            for (place, lobe) in lobes(&landings).into_iter().enumerate() {
+            for (place, lobe) in lobes(&landings, scene.photon_light_radius)
+                .into_iter()
+                .enumerate()
+            {
                 scene.guide[first + place] = lobe;
             }
         }
@@ -76,7 +81,8 @@ pub fn learn(scene: &mut PackedScene) {
 }
 
 /// Points and 1 - cos of half-angles so that each landing's direction lies in the lobe of the nearest point: greedy k-centres (Gonzalez 1985).
-fn lobes(landings: &[Landing]) -> Vec<[f32; 4]> {
+/// `light_radius`: half-angle at which lights show, radians.
+fn lobes(landings: &[Landing], light_radius: f32) -> Vec<[f32; 4]> {
     let directions: Vec<Vec3> = landings
         .iter()
         .map(|landing| (landing.from - landing.position).normalize_or_zero())
@@ -103,9 +109,11 @@ fn lobes(landings: &[Landing]) -> Vec<[f32; 4]> {
     }
     let half_angle = |centre: usize| {
         let members = nearest.iter().filter(|(of, _)| *of == centre);
-        let reach = members.map(|(_, apart)| *apart).fold(0.0, f32::max);
+        let (count, reach) = members.fold((0.0, 0.0_f32), |(count, reach), (_, apart)| {
+            (count + 1.0, reach.max(*apart))
+        });
         // The fewer landings, the less is known.
-        let unknown = LONE / (landings.len() as f32).sqrt();
+        let unknown = (LONE_OF_LIGHT * light_radius).min(LONE_WIDEST) / f32::sqrt(count);
         (WIDENING * reach).max(unknown).clamp(NARROWEST, WIDEST)
     };
     (centres.iter().enumerate())

@@ -7,6 +7,7 @@ use std::ops::Add;
 
 use super::blocks::Blocks;
 use super::measurement::{BlockMoments, Moments};
+use crate::cpu::photons::plan::Effort;
 use crate::packed::{PIXEL_BEAM_MAY_MEET_VIRTUAL, PixelInfo};
 
 /// Squared error aimed at, relative to that of one sample a ray everywhere.
@@ -116,20 +117,29 @@ impl Expected {
         }
     }
 
+    /// Error and cost of a pixel for every ray per pixel.
+    fn of_a_ray(&self, rates: Rates) -> (f32, f32) {
+        let (d, m) = (&self.difference, &self.mixed);
+        (
+            self.mean(d.error / rates.difference, m.error / rates.mixed),
+            self.mean(d.cost * rates.difference, m.cost * rates.mixed),
+        )
+    }
+
     fn mean(&self, difference: f32, mixed: f32) -> f32 {
         (1.0 - self.mixed_share) * difference + self.mixed_share * mixed
     }
 }
 
 /// The rates of each block for `rays` per pixel: the wanted error at least cost, and no error of a difference that shows, but not more samples in all than
-/// one a ray, highlights apart.
+/// one a ray, highlights apart. With them, what a ray per pixel then does.
 pub fn allocate(
     blocks: &Blocks,
     measured: &[BlockMoments],
     importance: &[f32],
     highlights: &[f32],
     rays: u32,
-) -> Vec<Rates> {
+) -> (Vec<Rates>, Effort) {
     let difference: Vec<Moments> = measured.iter().map(|m| m.difference).collect();
     let mixed: Vec<Moments> = measured.iter().map(|m| m.mixed).collect();
     let difference = smooth(blocks, &difference);
@@ -159,10 +169,7 @@ pub fn allocate(
         let mut samples = 0.0;
         for e in &expected {
             let rates = e.rates(gain);
-            error += e.mean(
-                e.difference.error / rates.difference,
-                e.mixed.error / rates.mixed,
-            );
+            error += e.of_a_ray(rates).0;
             samples += e.samples(rates);
         }
         error <= ERROR_SHARE * error_of_one || samples >= expected.len() as f32
@@ -184,9 +191,17 @@ pub fn allocate(
     } else {
         1.0
     };
-    (expected.iter())
+    let rates: Vec<Rates> = (expected.iter())
         .map(|e| e.with_highlight(visible(e, share), even))
-        .collect()
+        .collect();
+    let mut eye = Effort::default();
+    for (block, (e, &rates)) in expected.iter().zip(&rates).enumerate() {
+        let (error, cost) = e.of_a_ray(rates);
+        let pixels = blocks.pixels(block).count() as f64;
+        eye.error += pixels * f64::from(error);
+        eye.cost += pixels * f64::from(cost);
+    }
+    (rates, eye)
 }
 
 /// Smallest number between two that is enough, within a thousandth: rates and their effect rise with it.

@@ -14,18 +14,16 @@ mod measurement;
 mod patch;
 mod reach;
 
-use std::ops::Add;
-
 use super::contribution::photons_traced;
+use super::photons;
 use super::photons::guide::learn;
-use super::photons::plan::{EyeMoments, photons_per_ray, unmeasured};
+use super::photons::plan::{Effort, photons_per_ray, unmeasured};
 use allocation::{Rates, allocate};
 use beam::Beam;
 use blocks::Blocks;
 #[cfg(feature = "bench")]
 pub(crate) use importance::MAX_LIGHTS_EXAMINED;
 use importance::{PilotLights, importance};
-use measurement::Moments;
 pub use patch::LensGrid;
 pub(super) use patch::{Certainty, each_patch, in_world};
 use reach::WorldSpheres;
@@ -85,14 +83,18 @@ pub fn pilot(scene: &mut PackedScene, grid: Option<&LensGrid>, meter: &Meter<'_>
             .map(|&importance| Rates::from_importance(importance))
             .collect()
     } else {
-        let (measured, highlights) = measure(scene, &blocks, &flags, meter);
-        allocate(
+        let found = measure(scene, &blocks, &flags, meter);
+        let (rates, eye) = allocate(
             &blocks,
-            &measured,
+            &found.samples,
             &importances,
-            &highlights,
+            &found.highlights,
             scene.frame.rays_total,
-        )
+        );
+        if let Some(photon) = found.photon {
+            scene.photons_per_ray = photons_per_ray(width * height, photon, eye);
+        }
+        rates
     };
     scene.pixels = (0..flags.len())
         .map(|pixel| rates[blocks.of_pixel(pixel)].pixel(flags[pixel]))
@@ -179,13 +181,18 @@ fn look(
     (flags, importances)
 }
 
-/// What samples scatter and cost, and the squared errors of highlights, by blocks.
-fn measure(
-    scene: &mut PackedScene,
-    blocks: &Blocks,
-    flags: &[u32],
-    meter: &Meter<'_>,
-) -> (Vec<measurement::BlockMoments>, Vec<f32>) {
+/// What the plan follows from.
+struct Measured {
+    /// What samples scatter and cost, by blocks.
+    samples: Vec<measurement::BlockMoments>,
+    /// Squared errors of highlights, by blocks.
+    highlights: Vec<f32>,
+    /// Where photons are traced.
+    photon: Option<Effort>,
+}
+
+/// A few samples and photons, of a seed of their own.
+fn measure(scene: &mut PackedScene, blocks: &Blocks, flags: &[u32], meter: &Meter<'_>) -> Measured {
     let frame = scene.frame;
     scene.frame.seed = if scene.frame.seed == SEED {
         !SEED
@@ -203,10 +210,8 @@ fn measure(
         .iter()
         .map(|flags| PixelInfo::uniform(flags | shares))
         .collect();
-    let measured = measurement::measure(scene, blocks, || meter.add(STEPS_OF_A_BLOCK));
-    if photons_traced(&scene.frame) {
-        scene.photons_per_ray = photons_per_ray(scene, eye_moments(blocks, &measured));
-    }
+    let samples = measurement::measure(scene, blocks, || meter.add(STEPS_OF_A_BLOCK));
+    let photon = photons_traced(&scene.frame).then(|| photons::plan::measure(scene));
     let highlights = if scene.frame.photon_sphere_count > 0 {
         highlights::highlights(scene, blocks)
     } else {
@@ -226,29 +231,11 @@ fn measure(
         guide_cells_per_m,
         ..frame
     };
-    let highlights = highlights.iter().map(|h| h.unwrap_or(0.0)).collect();
-    (measured, highlights)
-}
-
-/// What a sample in every pixel does.
-fn eye_moments(blocks: &Blocks, measured: &[measurement::BlockMoments]) -> EyeMoments {
-    let mut sum = EyeMoments::default();
-    let samples: Vec<Moments> = (measured.iter())
-        .map(|block| block.difference + block.mixed)
-        .collect();
-    for (block, &own) in samples.iter().enumerate() {
-        let moments = if own.pixels > 0.0 {
-            own
-        } else {
-            blocks.gather(&samples, block, 1, Moments::default(), Moments::add)
-        };
-        if moments.pixels > 0.0 {
-            let share = blocks.pixels(block).count() as f64 / f64::from(moments.pixels);
-            sum.error += share * f64::from(moments.error);
-            sum.cost += share * f64::from(moments.cost);
-        }
+    Measured {
+        samples,
+        highlights: highlights.iter().map(|h| h.unwrap_or(0.0)).collect(),
+        photon,
     }
-    sum
 }
 
 #[cfg(test)]
