@@ -3,7 +3,7 @@
 import package::gpu::buffers::{frame, pixels};
 import package::camera::sampler::{SampleKey, SampleSet, sample_set};
 import package::packed::records::{FRAME_BACKDROP, FRAME_NO_PHOTONS, SIDE_VIRTUAL};
-import package::material::bsdf::{bsdf_is_diffuse, bsdf_is_polished};
+import package::material::bsdf::{bsdf_is_diffuse, bsdf_is_glossy, bsdf_is_polished};
 import package::material::surface::Surface;
 import package::cpu::state::{
     DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_FROM_LENS, EVENT_REAL_CHAIN, EVENT_SCATTERED, EVENT_SEEN, EVENT_VIRTUAL_CHAIN, MODE_MIXED, MODE_REAL, MODE_SHARED, PathState, path_radiances_real, path_results,
@@ -49,6 +49,11 @@ fn events_after(events: u32, depth: u32, side: u32, smooth_: bool) -> u32 {
     return before | select(EVENT_REAL_CHAIN, EVENT_VIRTUAL_CHAIN, side == SIDE_VIRTUAL);
 }
 
+fn is_smooth(s: Surface, side: u32, is_first: bool) -> bool {
+    if is_first || side != SIDE_VIRTUAL { return bsdf_is_polished(s); }
+    return bsdf_is_glossy(s);
+}
+
 fn left_to_photons(st: ptr<function, PathState>) -> bool {
     let chain = EVENT_SEEN | EVENT_VIRTUAL_CHAIN | EVENT_REAL_CHAIN;
     return photons_traced()
@@ -61,7 +66,7 @@ fn vertex_left_to_photons(st: ptr<function, PathState>, s: Surface) -> bool {
         && (*st).path.mode == MODE_MIXED
         && (*st).ray.side == SIDE_VIRTUAL
         && ((*st).path.events & (EVENT_SEEN | EVENT_REAL_CHAIN)) == EVENT_SEEN
-        && bsdf_is_polished(s);
+        && bsdf_is_glossy(s);
 }
 
 fn sees_backdrop(st: ptr<function, PathState>) -> bool {

@@ -82,7 +82,7 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
     @if(sharing) { offer_point(st, s); }
 
     @if(photons) {
-        if difference && bsdf_is_polished(s) { (*st).path.events |= EVENT_AT_POLISHED; }
+        if difference && is_smooth(s, (*st).ray.side, (*st).ray.depth == 1u) { (*st).path.events |= EVENT_AT_POLISHED; }
     }
     // Those of a path are played for certain.
     var techniques = Techniques(0.0, 1.0, 1u);
@@ -198,7 +198,7 @@ fn next_event(
     }
     var l = light_sample(index, s.position, pair(u));
     @if(backdrop) {
-        if lights[index].kind == LIGHT_ENVIRONMENT && sees_backdrop(st) && from_lens_after(st, s, false, bsdf_is_polished(s)) != 0u {
+        if lights[index].kind == LIGHT_ENVIRONMENT && sees_backdrop(st) && from_lens_after(st, s, false, is_smooth(s, (*st).ray.side, (*st).ray.depth == 1u)) != 0u {
             l.radiance = backdrop_radiance(s.position, l.direction);
         }
     }
@@ -364,9 +364,9 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
         }
     }
     var events = (*st).path.events;
-    @if(backdrop) let from_lens = from_lens_after(st, s, b.delta, b.delta || bsdf_is_polished(s));
+    @if(backdrop) let from_lens = from_lens_after(st, s, b.delta, b.delta || is_smooth(s, (*st).ray.side, (*st).ray.depth == 1u));
     @if(photons || backdrop) {
-        let smooth_ = b.delta || bsdf_is_polished(s);
+        let smooth_ = b.delta || is_smooth(s, (*st).ray.side, (*st).ray.depth == 1u);
         if !straight {
             events = events_after(events, (*st).ray.depth, (*st).ray.side, smooth_);
         }

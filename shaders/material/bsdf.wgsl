@@ -2,7 +2,7 @@
 
 import package::packed::records::{MATERIAL_LAMBERTIAN, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT};
 import package::material::interface::{max3, surface_index, thin_walled};
-import package::material::lobes::{lobes_albedo, lobes_are_delta, lobes_are_diffuse, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample, lobes_straight};
+import package::material::lobes::{lobes_albedo, lobes_are_delta, lobes_are_diffuse, lobes_are_glossy, lobes_are_polished, lobes_bound, lobes_eval, lobes_sample, lobes_straight};
 import package::material::scatter::{BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, kept_at_terminator, lambert_cos, sample_lambert};
 import package::math::INV_PI;
 import package::material::surface::Surface;
@@ -57,6 +57,10 @@ fn bsdf_is_diffuse(s: Surface) -> bool {
 
 fn bsdf_is_polished(s: Surface) -> bool {
     return !scatters_nothing(s) && !bsdf_is_lambertian(s) && lobes_are_polished(s);
+}
+
+fn bsdf_is_glossy(s: Surface) -> bool {
+    return !scatters_nothing(s) && !bsdf_is_lambertian(s) && lobes_are_glossy(s);
 }
 
 fn bsdf_passes_straight(s: Surface) -> bool {

@@ -225,9 +225,17 @@ fn transmit_straight(s: Surface, wo: vec3<f32>) -> vec3<f32> {
 }
 
 fn lobes_are_polished(s: Surface) -> bool {
+    return lobes_are_below(s, POLISHED_ALPHA);
+}
+
+fn lobes_are_glossy(s: Surface) -> bool {
+    return lobes_are_below(s, GLOSSY_ALPHA);
+}
+
+fn lobes_are_below(s: Surface, alpha: f32) -> bool {
     return max3(diffuse_color(s)) == 0.0
-        && s.ggx_alpha < POLISHED_ALPHA
-        && (s.clearcoat == 0.0 || s.coat_alpha < POLISHED_ALPHA);
+        && s.ggx_alpha < alpha
+        && (s.clearcoat == 0.0 || s.coat_alpha < alpha);
 }
 
 fn lobes_are_diffuse(s: Surface) -> bool {

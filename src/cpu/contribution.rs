@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::state::*;
 use crate::camera::sampler::{SampleKey, SampleSet, sample_set};
-use crate::material::{Surface, bsdf_is_diffuse, bsdf_is_polished};
+use crate::material::{Surface, bsdf_is_diffuse, bsdf_is_glossy, bsdf_is_polished};
 use crate::packed::{
     ESTIMATOR_PAPER, FRAME_BACKDROP, FRAME_NO_PHOTONS, Frame, PackedScene, SIDE_VIRTUAL,
 };
@@ -96,6 +96,15 @@ pub fn events_after(events: u32, depth: u32, side: u32, smooth: bool) -> u32 {
     before | chain
 }
 
+/// Whether light that comes by way of the vertex is the photons'. Where the camera first meets a surface, and on real ones, less blur makes it their
+/// landing place.
+pub fn is_smooth(s: &Surface, side: u32, is_first: bool) -> bool {
+    if is_first || side != SIDE_VIRTUAL {
+        return bsdf_is_polished(s);
+    }
+    bsdf_is_glossy(s)
+}
+
 /// Whether photons bring what a mixed path now finds: from a vertex that scatters, smooth virtual surfaces alone lead to the light.
 pub fn left_to_photons(scene: &PackedScene, st: &PathState) -> bool {
     let chain = EVENT_SEEN | EVENT_VIRTUAL_CHAIN | EVENT_REAL_CHAIN;
@@ -104,13 +113,13 @@ pub fn left_to_photons(scene: &PackedScene, st: &PathState) -> bool {
         && st.path.events & chain == EVENT_SEEN | EVENT_VIRTUAL_CHAIN
 }
 
-/// Whether photons bring what lights send by way of the vertex of a mixed path: it is virtual and polished, and comes after one that scatters.
+/// Whether photons bring what lights send by way of the vertex of a mixed path: it is virtual and glossy, and comes after one that scatters.
 pub fn vertex_left_to_photons(scene: &PackedScene, st: &PathState, s: &Surface) -> bool {
     photons_traced(&scene.frame)
         && st.path.mode == MODE_MIXED
         && st.ray.side == SIDE_VIRTUAL
         && st.path.events & (EVENT_SEEN | EVENT_REAL_CHAIN) == EVENT_SEEN
-        && bsdf_is_polished(s)
+        && bsdf_is_glossy(s)
 }
 
 /// Whether what the path sees of the world that is not modelled is what the photograph shows.

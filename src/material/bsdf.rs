@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::interface::{max3, surface_index, thin_walled};
 use super::lobes::{
-    lobes_albedo, lobes_are_delta, lobes_are_diffuse, lobes_are_polished, lobes_bound, lobes_eval,
-    lobes_sample, lobes_straight,
+    lobes_albedo, lobes_are_delta, lobes_are_diffuse, lobes_are_glossy, lobes_are_polished,
+    lobes_bound, lobes_eval, lobes_sample, lobes_straight,
 };
 use super::scatter::{
     BsdfEval, BsdfSample, EVAL_NOTHING, SAMPLE_NOTHING, kept_at_terminator, lambert_cos,
@@ -73,9 +73,14 @@ pub fn bsdf_is_diffuse(s: &Surface) -> bool {
     bsdf_is_lambertian(s) || lobes_are_diffuse(s)
 }
 
-/// Nothing but lobes that mirror or bend light with little blur: as far as photons go, it is smooth.
+/// Nothing but lobes that mirror or bend light with little blur: photons that land there are not seen well.
 pub fn bsdf_is_polished(s: &Surface) -> bool {
     !scatters_nothing(s) && !bsdf_is_lambertian(s) && lobes_are_polished(s)
+}
+
+/// The same with some blur: light that comes by way of it is found better by photons.
+pub fn bsdf_is_glossy(s: &Surface) -> bool {
+    !scatters_nothing(s) && !bsdf_is_lambertian(s) && lobes_are_glossy(s)
 }
 
 /// What a smooth interface lets through goes straight on: it bends nothing.

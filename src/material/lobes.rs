@@ -35,8 +35,10 @@ use crate::math::INV_PI;
 use crate::shared::shared;
 
 shared! {
-    /// GGX alpha under which a surface that has no other lobes counts as polished: roughness 0.3. Lamps in it are found from their side.
+    /// GGX alpha under which a surface that has no other lobes counts as polished: roughness 0.3.
     pub const POLISHED_ALPHA: f32 = 0.09;
+    /// And as glossy: roughness 0.45. What lamps send by way of it is found from their side.
+    pub const GLOSSY_ALPHA: f32 = 0.2;
     /// Reflectance of the clearcoat, index 1.5, at normal incidence.
     const COAT_F0: f32 = 0.04;
     const LARGEST_BELOW_1: f32 = 0.999_999_94;
@@ -280,9 +282,18 @@ fn transmit_straight(s: &Surface, wo: Vec3) -> Vec3 {
 
 /// Nothing but lobes that mirror or bend light with little blur.
 pub fn lobes_are_polished(s: &Surface) -> bool {
+    lobes_are_below(s, POLISHED_ALPHA)
+}
+
+/// The same with some blur.
+pub fn lobes_are_glossy(s: &Surface) -> bool {
+    lobes_are_below(s, GLOSSY_ALPHA)
+}
+
+fn lobes_are_below(s: &Surface, alpha: f32) -> bool {
     max3(diffuse_color(s)) == 0.0
-        && s.ggx_alpha < POLISHED_ALPHA
-        && (s.clearcoat == 0.0 || s.coat_alpha < POLISHED_ALPHA)
+        && s.ggx_alpha < alpha
+        && (s.clearcoat == 0.0 || s.coat_alpha < alpha)
 }
 
 pub fn lobes_are_diffuse(s: &Surface) -> bool {

@@ -18,11 +18,11 @@ pub(crate) mod texture;
 
 pub use bsdf::{
     bsdf_albedo, bsdf_directional_albedo_bound, bsdf_eval, bsdf_index_ratio, bsdf_is_delta,
-    bsdf_is_diffuse, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample,
-    bsdf_straight,
+    bsdf_is_diffuse, bsdf_is_glossy, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight,
+    bsdf_sample, bsdf_straight,
 };
 pub use ggx::{DELTA_ALPHA, transmits_unblurred};
-pub use lobes::POLISHED_ALPHA;
+pub use lobes::GLOSSY_ALPHA;
 pub use scatter::{BsdfEval, BsdfSample};
 pub use surface::{Surface, surface_alpha, surface_at, triangle_emission};
 pub use texture::{srgb_decode, texture_sample};

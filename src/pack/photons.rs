@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use glam::Vec3;
 
 use crate::accel::Cover;
-use crate::material::{DELTA_ALPHA, POLISHED_ALPHA, transmits_unblurred};
+use crate::material::{DELTA_ALPHA, GLOSSY_ALPHA, transmits_unblurred};
 use crate::math::luminance;
 use crate::packed::materials::MaterialKey;
 use crate::packed::{
@@ -200,7 +200,7 @@ fn is_smooth_somewhere(packed: &PackedScene, material: &Material) -> bool {
         && material.transmission == 1.0
         && material.metallic == 0.0
         && !is_textured;
-    let is_polished = pure && alpha < POLISHED_ALPHA && !is_invisible;
+    let is_glossy = pure && alpha < GLOSSY_ALPHA && !is_invisible;
     let mirrors = alpha < DELTA_ALPHA
         && !is_invisible
         && (material.metallic > 0.0 || material.specular > 0.0 || material.transmission > 0.0);
@@ -208,7 +208,7 @@ fn is_smooth_somewhere(packed: &PackedScene, material: &Material) -> bool {
         && material.flags & MATERIAL_THIN_WALLED == 0
         && material.ior != 1.0
         && transmits_unblurred(alpha, material.ior);
-    is_polished || mirrors || bends || (material.clearcoat > 0.0 && coat * coat < DELTA_ALPHA)
+    is_glossy || mirrors || bends || (material.clearcoat > 0.0 && coat * coat < DELTA_ALPHA)
 }
 
 /// Least value of a texture's second channel, in 0..1; 1 where there is none.

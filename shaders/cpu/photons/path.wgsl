@@ -8,6 +8,7 @@ import package::camera::sampler::{SampleKey, SampleSet, fourth, pair, sample_set
 import package::camera::shutter::camera_pose;
 @if(shutter) import package::camera::shutter::camera_pose_at;
 import package::camera::splat::{exposure_weight, lens_connect};
+import package::cpu::contribution::is_smooth;
 import package::cpu::estimator::virtual_is_nearer;
 import package::cpu::photons::emission::emit;
 import package::cpu::panes::{PANE_SETS, open_share, transmittance};
@@ -183,7 +184,7 @@ fn scatter(photon: ptr<function, Photon>, s: Surface, wi: vec3<f32>) -> bool {
     let straight = b.delta && b.transmitted && bsdf_passes_straight(s);
     if is_last && !straight { return false; }
     if !(*photon).landed && !straight {
-        if b.delta || bsdf_is_polished(s) {
+        if b.delta || is_smooth(s, (*photon).st.ray.side, false) {
             if (*photon).st.ray.side == SIDE_REAL { return false; }
             (*photon).chained = true;
         } else {

@@ -9,6 +9,7 @@ use super::emission::emit;
 use crate::camera::sampler::{SampleKey, SampleSet, sample_set};
 use crate::camera::shutter::{camera_pose, camera_pose_at};
 use crate::camera::splat::{exposure_weight, lens_connect};
+use crate::cpu::contribution::is_smooth;
 use crate::cpu::estimator::virtual_is_nearer;
 use crate::cpu::panes::{PANE_SETS, open_share, transmittance};
 use crate::cpu::request::answer;
@@ -296,7 +297,7 @@ fn scatter(scene: &PackedScene, photon: &mut Photon, s: &Surface, wi: Vec3) -> b
         return false;
     }
     if !photon.landed && !straight {
-        if b.delta || bsdf_is_polished(s) {
+        if b.delta || is_smooth(s, photon.st.ray.side, false) {
             // A smooth real surface on the way: the eye's paths bring that.
             if photon.st.ray.side == SIDE_REAL {
                 return false;
