@@ -18,7 +18,7 @@ const LEAST: f64 = 1.0 / 64.0;
 const GREATEST_COST: f64 = 1.0;
 
 /// The eye's samples are spread evenly, and leave so many times less error than independent ones: 1.8 to 4.8 times at 25 rays (docs/estimator.md).
-const EVENNESS: f64 = 2.0;
+const EVENNESS: f64 = 3.0;
 
 /// What one does: a photon, or a ray per pixel with all its samples by the plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
