@@ -35,7 +35,7 @@ fn bands(errors: &[f32], costs: &[f32]) -> (Blocks, Vec<BlockMoments>) {
 fn allocate_evenly(blocks: &Blocks, moments: &[BlockMoments], importance: f32) -> Vec<Rates> {
     let everywhere = |value| vec![value; blocks.count()];
     let importance = everywhere(importance);
-    allocate(blocks, moments, &importance, &everywhere(0.0), MANY_RAYS)
+    allocate(blocks, moments, &importance, &everywhere(0.0), MANY_RAYS).0
 }
 
 /// The rate in the middle of each band.
@@ -146,8 +146,8 @@ fn highlights_raise_the_rate_where_they_are() {
     let mut somewhere = nowhere.clone();
     let lit = ROWS / 2 * 2 * COLUMNS_PER_BAND + COLUMNS_PER_BAND / 2;
     somewhere[lit] = 100.0;
-    let without = allocate(&blocks, &moments, &nowhere, &nowhere, MANY_RAYS);
-    let with = allocate(&blocks, &moments, &nowhere, &somewhere, MANY_RAYS);
+    let without = allocate(&blocks, &moments, &nowhere, &nowhere, MANY_RAYS).0;
+    let with = allocate(&blocks, &moments, &nowhere, &somewhere, MANY_RAYS).0;
     for block in 0..blocks.count() {
         if block == lit {
             assert!(with[block].mixed > 4.0 * without[block].mixed);
@@ -166,7 +166,7 @@ fn what_would_show_is_evaluated_more_often() {
     errors[0] = 0.64;
     let (blocks, moments) = bands(&errors, &[4.0; 8]);
     let nowhere = vec![0.0; blocks.count()];
-    let after = |rays| allocate(&blocks, &moments, &nowhere, &nowhere, rays);
+    let after = |rays| allocate(&blocks, &moments, &nowhere, &nowhere, rays).0;
     let many = middles(&after(MANY_RAYS), 8);
     assert!(many[0] < 2.0, "control: nothing shows: {many:?}");
     let some = middles(&after(100), 8);
