@@ -1,28 +1,20 @@
 //! Focal length and horizon from the straight lines of a photograph: of rooms, streets, tables, whatever has right angles.
 
+mod guesses;
+mod plane;
 mod segments;
+mod sheet;
+mod squares;
+mod told;
 mod vanishing;
 
 pub use segments::{Grey, Segment, segments};
+pub use told::{Basis, Lines};
 pub use vanishing::KnownFocal;
 
 use glam::DVec3;
+use sheet::read_sheet;
 use vanishing::{Axes, MOST_LINES, find_axes};
-
-/// What the lines say.
-#[derive(Clone, Debug)]
-pub struct Lines {
-    pub focal_px: f64,
-    /// Standard deviation, as a share of the focal length.
-    pub focal_sigma: f64,
-    /// Camera space (x right, y up, z back), unit length.
-    pub up: DVec3,
-    pub up_sigma_deg: f64,
-    /// With the axis that each runs along; `None`: elsewhere.
-    pub segments: Vec<(Segment, Option<usize>)>,
-    /// Of the lines that run along an axis, in standard deviations of a line.
-    pub rms: f64,
-}
 
 /// Gradients from which on edges are looked for, codes per pixel: what is sharp and noisy wants other ones than what is soft.
 const EDGES: [f32; 3] = [2.0, 3.5, 5.0];
@@ -31,9 +23,6 @@ const EDGES: [f32; 3] = [2.0, 3.5, 5.0];
 const LEAST_BITS: f64 = 55.0;
 const LEAST_SHARE: f64 = 0.5;
 const MOST_RMS: f64 = 0.9;
-/// Nothing is claimed that is less sure.
-const MOST_FOCAL_SIGMA: f64 = 0.1;
-const MOST_UP_SIGMA_DEG: f64 = 2.5;
 /// An axis that leans by less from the picture's vertical, as a cosine, is that of walls, if the surface that the lines lie in faces the camera like
 /// one.
 const WALL_VERTICAL: f64 = 0.94;
@@ -41,6 +30,11 @@ const WALL_FACES: f64 = 0.25;
 
 /// What the lines of a picture say of its camera; `None`: not enough to be sure.
 pub fn read_lines(grey: &Grey, known: Option<KnownFocal>) -> Option<Lines> {
+    read_sheet(grey, known).or_else(|| read_axes(grey, known))
+}
+
+/// By lines along axes at right angles.
+fn read_axes(grey: &Grey, known: Option<KnownFocal>) -> Option<Lines> {
     let size = (grey.width as f64, grey.height as f64);
     let fits: Vec<Lines> = (EDGES.iter())
         .filter_map(|edge| {
@@ -53,17 +47,9 @@ pub fn read_lines(grey: &Grey, known: Option<KnownFocal>) -> Option<Lines> {
     // Where other edges say something else, neither is sure.
     let mut sure = best.clone();
     for other in &fits {
-        let focal = (other.focal_px / best.focal_px).ln().abs();
-        let up_deg = other.up.dot(best.up).clamp(-1.0, 1.0).acos().to_degrees();
-        sure.focal_sigma = sure.focal_sigma.max(focal);
-        sure.up_sigma_deg = sure.up_sigma_deg.max(up_deg);
+        sure.doubted_by(other.focal_px, other.up);
     }
-    is_sure(&sure, known.is_some()).then_some(sure)
-}
-
-fn is_sure(lines: &Lines, focal_is_known: bool) -> bool {
-    (focal_is_known || lines.focal_sigma < MOST_FOCAL_SIGMA)
-        && lines.up_sigma_deg < MOST_UP_SIGMA_DEG
+    sure.is_sure(known.is_some()).then_some(sure)
 }
 
 fn claim(axes: &Axes, segments: Vec<Segment>, focal_is_known: bool) -> Option<Lines> {
@@ -86,11 +72,11 @@ fn claim(axes: &Axes, segments: Vec<Segment>, focal_is_known: bool) -> Option<Li
         up: axis * axis.y.signum(),
         up_sigma_deg: axes.axis_sigma[up].to_degrees(),
         segments,
-        rms: axes.rms,
+        basis: Basis::Lines { rms: axes.rms },
     };
     let explains =
         bits[1] >= LEAST_BITS && explained >= LEAST_SHARE * total && axes.rms <= MOST_RMS;
-    (explains && is_sure(&lines, focal_is_known)).then_some(lines)
+    (explains && lines.is_sure(focal_is_known)).then_some(lines)
 }
 
 /// Which axis is up. Lines along two axes alone lie in one surface, which carries things, unless it faces the camera like a wall with upright lines;

@@ -27,13 +27,13 @@ const BEND_SIGMA: f64 = 0.0025;
 /// Standard deviations from which on a line points elsewhere.
 const MOST_SIGMAS: f64 = 3.0;
 /// Focal lengths from 130 down to 12 degrees across the diagonal.
-const FOCAL: std::ops::Range<f64> = 0.47..9.5;
+pub const FOCAL: std::ops::Range<f64> = 0.47..9.5;
 /// Of the logarithm of the focal length, where nothing is known, about a normal lens.
-const FOCAL_PRIOR: (f64, f64) = (1.6, 0.5);
+pub const FOCAL_PRIOR: (f64, f64) = (1.6, 0.5);
 /// A third axis is one only with so many of the second one's bits: else it takes up what points there by chance.
 const LEAST_THIRD: f64 = 0.4;
 /// Of the lens's bending: p / (1 + bend |p|^2) is where a pinhole sees p.
-const BEND_PRIOR: f64 = 0.08;
+pub const BEND_PRIOR: f64 = 0.08;
 
 /// What is known of a focal length before.
 #[derive(Clone, Copy, Debug, PartialEq)]
