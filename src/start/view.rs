@@ -81,8 +81,9 @@ impl View {
     }
 }
 
-/// Lines are looked for in means of blocks of the pixels' codes.
-fn lines_of(photo: &Photo, known: Option<KnownFocal>) -> Option<Lines> {
+/// What a photograph's straight lines and squares say of its camera, in its pixels; `None`: nothing that is sure. They are looked for in means of blocks of
+/// the pixels' codes.
+pub fn lines_of(photo: &Photo, known: Option<KnownFocal>) -> Option<Lines> {
     let block = photo.width.max(photo.height).div_ceil(LINES_SIDE_PX) as usize;
     let (width, height) = (photo.width as usize / block, photo.height as usize / block);
     let codes = (0..width * height).map(|i| {

@@ -6,11 +6,9 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 use nalgebra::{DMatrix, DVector};
 
 use super::guesses::{Guess, guesses, turned};
+use super::model::{BEND_PRIOR, CENTRE_PRIOR, FOCAL};
 use super::squares::Patch;
-use super::vanishing::{BEND_PRIOR, FOCAL, FOCAL_PRIOR};
 
-/// Of the place of the lens's axis in the picture, half diagonals.
-const CENTRE_PRIOR: f64 = 0.03;
 /// What is tried first, half diagonals.
 const FIRST_FOCALS: [f64; 3] = [1.0, 1.7, 3.0];
 /// Standard deviations from which on a corner counts for nothing.

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 
+use super::model::{FOCAL_PRIOR, KnownFocal};
 use super::plane::{Fit, fits};
 use super::segments::{Grey, Segment};
 use super::squares::{Patch, find_boards, find_dark_squares};
 use super::told::{Basis, Lines};
-use super::vanishing::{FOCAL_PRIOR, KnownFocal};
 
 /// Of a corner, pixels: no camera and no sheet of paper is better.
 const LEAST_SIGMA_PX: f64 = 0.25;
@@ -23,7 +23,7 @@ const MOST_BOARDS: usize = 3;
 /// A fit is no rival of the best if its cost is higher by this.
 const RIVAL: f64 = 9.0;
 
-/// What the squares of a picture say of its camera; `None`: there are none, or not enough to be sure.
+/// What the squares of a picture say of its camera, sure or not; `None`: there are none.
 pub fn read_sheet(grey: &Grey, known: Option<KnownFocal>) -> Option<Lines> {
     let boards = find_boards(grey).into_iter().take(MOST_BOARDS);
     let groups = boards
@@ -78,7 +78,7 @@ fn claim(group: &[Patch], grey: &Grey, known: Option<KnownFocal>) -> Option<Line
     for rival in found.iter().filter(|fit| fit.cost < best.cost + RIVAL) {
         lines.doubted_by(rival.log_focal.exp() * unit_px, up(rival));
     }
-    (lines.is_sure(known.is_some()) && best.are_squares(least_sigma, focal)).then_some(lines)
+    best.are_squares(least_sigma, focal).then_some(lines)
 }
 
 fn are_enough(patches: &[Patch]) -> bool {
