@@ -121,3 +121,68 @@ fn segments(fit: &Fit, centre: DVec2, unit_px: f64) -> Vec<(Segment, Option<usiz
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DMat3;
+
+    use super::*;
+
+    const FOCAL_PX: f64 = 520.0;
+
+    /// Down on a sheet from half the side, turned.
+    fn axes() -> DMat3 {
+        DMat3::from_rotation_x(-0.9) * DMat3::from_rotation_y(0.3) * DMat3::from_rotation_z(0.2)
+    }
+
+    /// Four by three dark rectangles on white paper, one wide and `high`, apart by a half, through a lens that bends lines.
+    fn rectangles(high: f64, bend: f64) -> Grey {
+        let centre = DVec2::new(320.0, 240.0);
+        let shade = |x: f64, y: f64| {
+            let p = (DVec2::new(x, y) - centre) / 400.0;
+            let ray = (p / (1.0 + bend * p.length_squared()) * 400.0).extend(FOCAL_PX);
+            let normal = axes().col(2);
+            // Its middle is eight widths ahead.
+            let at = ray * (8.0 * normal.z / normal.dot(ray)) - DVec3::Z * 8.0;
+            let (u, v) = (at.dot(axes().col(0)) + 3.0, at.dot(axes().col(1)) + 2.25);
+            let dark = (0.0..6.0).contains(&u)
+                && (0.0..3.0 * (high + 0.5)).contains(&v)
+                && u.rem_euclid(1.5) < 1.0
+                && v.rem_euclid(high + 0.5) < high;
+            if dark { 40.0 } else { 200.0 }
+        };
+        let codes = (0..640 * 480).map(|i| {
+            let at = |d: f64, e: f64| shade((i % 640) as f64 + d, (i / 640) as f64 + e);
+            let steps = [0.125, 0.375, 0.625, 0.875];
+            let sum: f64 = steps.iter().flat_map(|d| steps.map(|e| at(*d, e))).sum();
+            (sum / 16.0) as f32
+        });
+        Grey {
+            width: 640,
+            height: 480,
+            codes: codes.collect(),
+        }
+    }
+
+    #[test]
+    fn a_sheet_of_squares_tells_focal_length_and_horizon() {
+        for bend in [0.0, -0.08] {
+            let found = read_sheet(&rectangles(1.0, bend), None).expect("squares");
+            let off = found.focal_px / FOCAL_PX - 1.0;
+            assert!(off.abs() < 0.03, "{off}");
+            assert!(found.focal_sigma > off.abs() && found.is_sure(false));
+            let up = -axes().col(2) * DVec3::new(1.0, -1.0, -1.0);
+            let off_deg = found.up.dot(up).acos().to_degrees();
+            assert!(off_deg < 1.0, "{off_deg}");
+            let along = axes().col(0);
+            assert!(found.up.dot(along).acos().to_degrees() > 30.0, "control");
+            assert!(matches!(found.basis, Basis::Squares { corners: 48, .. }));
+        }
+    }
+
+    #[test]
+    fn rectangles_are_no_squares() {
+        assert!(read_sheet(&rectangles(0.7, 0.0), None).is_none());
+        assert!(read_sheet(&rectangles(1.0, 0.0), None).is_some(), "control");
+    }
+}
