@@ -8,13 +8,21 @@ use nalgebra::{DMatrix, DVector};
 use super::guesses::{Guess, guesses, turned};
 use super::model::{BEND_PRIOR, CENTRE_PRIOR, FOCAL};
 use super::squares::Patch;
+use crate::least_squares::{Descending, Descent};
 
 /// What is tried first, half diagonals.
 const FIRST_FOCALS: [f64; 3] = [1.0, 1.7, 3.0];
 /// Standard deviations from which on a corner counts for nothing.
 const MOST_SIGMAS: f64 = 4.0;
+/// Rounds of a descent, each with the corners' standard deviation taken anew.
 const ROUNDS: usize = 4;
-const STEPS: usize = 12;
+const DESCENT: Descent = Descent {
+    steps: 12,
+    first_damping: 1e-3,
+    least_damping: 1e-7,
+    most_damping: 1e6,
+    least_gain: 1e-5,
+};
 /// How far paper bends out of its plane, of the distance from its middle at which it does.
 const CURVE_PRIOR: f64 = 0.005;
 /// Of the logarithm of the squares' width over their height: as printed, and where they may be none.
@@ -41,6 +49,8 @@ pub struct Fit {
     curves: DVec3,
     log_aspect: f64,
     aspect_prior: f64,
+    /// What the logarithm of the focal length is before, and its standard deviation.
+    focal_prior: (f64, f64),
     /// Of the squares about `ahead`.
     radius: f64,
     /// In the plane, from where `ahead` meets it.
@@ -51,7 +61,6 @@ pub struct Fit {
     ahead: DVec3,
     /// Of a corner, half diagonals.
     pub sigma: f64,
-    pub cost: f64,
     covariance: DMatrix<f64>,
 }
 
@@ -61,7 +70,7 @@ fn bent(p: DVec2, bend: f64) -> DVec2 {
 }
 
 impl Fit {
-    pub fn guessed(guess: Guess) -> Self {
+    fn guessed(guess: Guess, focal_prior: (f64, f64)) -> Self {
         let of_patches = guess.patches.iter().zip(&guess.places).zip(&guess.turns);
         let (mut squares, mut count) = (0.0, 0.0);
         for ((patch, place), turn) in of_patches {
@@ -79,13 +88,13 @@ impl Fit {
             curves: DVec3::ZERO,
             log_aspect: 0.0,
             aspect_prior: SQUARE,
+            focal_prior,
             radius: f64::sqrt(squares / f64::max(count, 1.0)),
             places: guess.places,
             turns: guess.turns,
             patches: guess.patches,
             ahead: guess.ahead,
             sigma: 0.0,
-            cost: 0.0,
             covariance: DMatrix::zeros(0, 0),
         }
     }
@@ -132,32 +141,33 @@ impl Fit {
     }
 
     /// Parameter, what it is off, and its standard deviation.
-    fn priors(&self, prior: (f64, f64)) -> [(usize, f64, f64); 8] {
+    fn priors(&self) -> [(usize, f64, f64); 8] {
+        let (log_focal, focal_sigma) = self.focal_prior;
         let curve = 2.0 * CURVE_PRIOR / self.radius;
         [
             (8, self.curves.x, curve),
             (9, self.curves.y, curve),
             (10, self.curves.z, curve),
             (11, self.log_aspect, self.aspect_prior),
-            (0, self.log_focal - prior.0, prior.1),
+            (0, self.log_focal - log_focal, focal_sigma),
             (1, self.bend, BEND_PRIOR),
             (2, self.centre.x, CENTRE_PRIOR),
             (3, self.centre.y, CENTRE_PRIOR),
         ]
     }
 
-    fn cost(&self, sigma: f64, prior: (f64, f64)) -> f64 {
+    fn cost_by(&self, sigma: f64) -> f64 {
         let of_points: f64 = (self.misses().iter().flatten())
             .map(|miss| tukey_cost(miss.length() / sigma))
             .sum();
-        let of_priors: f64 = (self.priors(prior).iter())
+        let of_priors: f64 = (self.priors().iter())
             .map(|(_, off, sigma)| (off / sigma).powi(2))
             .sum();
         of_points + of_priors
     }
 
     /// Normal equations with Tukey's weights.
-    fn equations(&self, sigma: f64, prior: (f64, f64)) -> (DMatrix<f64>, DVector<f64>) {
+    fn equations(&self, sigma: f64) -> (DMatrix<f64>, DVector<f64>) {
         const STEP: f64 = 1e-6;
         let size = SHARED + 2 * self.patches.len();
         let mut matrix = DMatrix::zeros(size, size);
@@ -200,7 +210,7 @@ impl Fit {
                 }
             }
         }
-        for (i, off, sigma) in self.priors(prior) {
+        for (i, off, sigma) in self.priors() {
             matrix[(i, i)] += sigma.powi(-2);
             gradient[i] += off / (sigma * sigma);
         }
@@ -223,15 +233,13 @@ impl Fit {
         (off[off.len() * 4 / 5] / 1.79).max(least)
     }
 
-    /// Levenberg's and Marquardt's steps, the corners' standard deviation taken anew from what is off in each round.
-    fn refined(mut self, least_sigma: f64, prior: (f64, f64)) -> Option<Self> {
+    fn refined(mut self, least_sigma: f64) -> Option<Self> {
         for _ in 0..ROUNDS {
             self.sigma = self.spread(least_sigma);
-            self = self.descended(prior)?;
+            (self, _) = DESCENT.from(self);
         }
         self.sigma = self.spread(least_sigma);
-        self.cost = self.cost(self.sigma, prior);
-        let (matrix, _) = self.equations(EXCESS.sqrt() * self.sigma, prior);
+        let (matrix, _) = self.equations(EXCESS.sqrt() * self.sigma);
         self.covariance = matrix.try_inverse()?;
         FOCAL.contains(&self.log_focal.exp()).then_some(self)
     }
@@ -265,47 +273,36 @@ impl Fit {
     }
 
     /// What they are seen to be says nothing against squares.
-    pub fn are_squares(&self, least_sigma: f64, prior: (f64, f64)) -> bool {
+    pub fn are_squares(&self, least_sigma: f64) -> bool {
         let free = Self {
             aspect_prior: ANY_RECTANGLE,
             ..self.clone()
         };
-        free.refined(least_sigma, prior).is_some_and(|free| {
+        free.refined(least_sigma).is_some_and(|free| {
             let sigma = free.covariance[(11, 11)].sqrt();
             free.log_aspect.abs() < MOST_OFF_SQUARE.max(3.0 * sigma)
         })
     }
+}
 
-    fn descended(mut self, prior: (f64, f64)) -> Option<Self> {
-        let mut cost = self.cost(self.sigma, prior);
-        let mut damping = 1e-3;
-        for _ in 0..STEPS {
-            let (matrix, gradient) = self.equations(self.sigma, prior);
-            loop {
-                let mut damped = matrix.clone();
-                for i in 0..damped.nrows() {
-                    damped[(i, i)] = damped[(i, i)] * (1.0 + damping) + 1e-9;
-                }
-                let step = -damped.cholesky()?.solve(&gradient);
-                let trial = self.changed(step.as_slice());
-                let trial_cost = trial.cost(self.sigma, prior);
-                if trial_cost < cost {
-                    let is_done = cost - trial_cost < 1e-5 * cost;
-                    self = trial;
-                    cost = trial_cost;
-                    damping = f64::max(0.1 * damping, 1e-7);
-                    if is_done {
-                        return Some(self);
-                    }
-                    break;
-                }
-                damping *= 10.0;
-                if damping > 1e6 {
-                    return Some(self);
-                }
-            }
+impl Descending for Fit {
+    type Linearised = (DMatrix<f64>, DVector<f64>);
+
+    fn cost(&self) -> f64 {
+        self.cost_by(self.sigma)
+    }
+
+    fn linearised(&self) -> Self::Linearised {
+        self.equations(self.sigma)
+    }
+
+    fn stepped(&self, (matrix, gradient): &Self::Linearised, damping: f64) -> Option<Self> {
+        let mut damped = matrix.clone();
+        for i in 0..damped.nrows() {
+            damped[(i, i)] = damped[(i, i)] * (1.0 + damping) + 1e-9;
         }
-        Some(self)
+        let step = -damped.cholesky()?.solve(gradient);
+        Some(self.changed(step.as_slice()))
     }
 }
 
@@ -318,16 +315,21 @@ fn tukey_cost(sigmas: f64) -> f64 {
     MOST_SIGMAS * MOST_SIGMAS / 3.0 * (1.0 - inside.powi(3))
 }
 
-/// The fits of one group of patches that take up most of them, the best first; `patches` in half diagonals about the centre, the focal length's
-/// logarithm and its standard deviation before.
-pub fn fits(patches: &[Patch], focal: (f64, f64), is_known: bool, least_sigma: f64) -> Vec<Fit> {
+/// The fits of one group of patches that take up most of them, the best first, with their costs; `patches` in half diagonals about the centre, the focal
+/// length's logarithm and its standard deviation before.
+pub fn fits(
+    patches: &[Patch],
+    focal: (f64, f64),
+    is_known: bool,
+    least_sigma: f64,
+) -> Vec<(f64, Fit)> {
     let focals = match is_known {
         true => vec![focal.0.exp()],
         false => FIRST_FOCALS.to_vec(),
     };
     let mut found: Vec<Fit> = guesses(patches, &focals)
         .into_iter()
-        .filter_map(|guess| Fit::guessed(guess).refined(least_sigma, focal))
+        .filter_map(|guess| Fit::guessed(guess, focal).refined(least_sigma))
         .collect();
     let most = found.iter().map(|fit| fit.patches.len()).max();
     found.retain(|fit| Some(fit.patches.len()) == most);
@@ -335,9 +337,9 @@ pub fn fits(patches: &[Patch], focal: (f64, f64), is_known: bool, least_sigma: f
     let sigma = (found.iter())
         .map(|fit| fit.sigma)
         .fold(f64::INFINITY, f64::min);
-    for fit in &mut found {
-        fit.cost = fit.cost(sigma, focal);
-    }
-    found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let mut found: Vec<(f64, Fit)> = (found.into_iter())
+        .map(|fit| (fit.cost_by(sigma), fit))
+        .collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
     found
 }

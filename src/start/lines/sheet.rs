@@ -52,7 +52,7 @@ fn claim(group: &[Patch], grey: &Grey, known: Option<KnownFocal>) -> Option<Line
     };
     let least_sigma = LEAST_SIGMA_PX / unit_px;
     let found = fits(&patches, focal, known.is_some(), least_sigma);
-    let best = found.first()?;
+    let (cost, best) = found.first()?;
     // x right, y down, z ahead to x right, y up, z back.
     let up = |fit: &Fit| fit.normal() * DVec3::new(1.0, -1.0, -1.0);
     let corners: usize = best.patches.iter().map(|patch| patch.points.len()).sum();
@@ -75,10 +75,10 @@ fn claim(group: &[Patch], grey: &Grey, known: Option<KnownFocal>) -> Option<Line
     if !explains {
         return None;
     }
-    for rival in found.iter().filter(|fit| fit.cost < best.cost + RIVAL) {
+    for (_, rival) in found.iter().filter(|(own, _)| *own < cost + RIVAL) {
         lines.doubted_by(rival.log_focal.exp() * unit_px, up(rival));
     }
-    best.are_squares(least_sigma, focal).then_some(lines)
+    best.are_squares(least_sigma).then_some(lines)
 }
 
 fn are_enough(patches: &[Patch]) -> bool {
