@@ -15,6 +15,7 @@ mod gltf_pictures;
 mod interrupted;
 mod invariants;
 mod light_fit;
+mod lines;
 mod live;
 mod overwriting;
 #[cfg(feature = "preview")]

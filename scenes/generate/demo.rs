@@ -16,7 +16,7 @@ use crate::{environment, glb, texture};
 const PHOTO_RAYS: u32 = 256;
 
 /// A good camera at a low ISO.
-const SENSOR: Sensor = Sensor {
+pub const SENSOR: Sensor = Sensor {
     shot_variance: 6e-5,
     read_sigma: 8e-4,
 };
@@ -38,7 +38,7 @@ pub fn generate(folder: &Path) -> Result<(), Box<dyn Error>> {
     write_proxy(folder)?;
     write_virtual(folder)?;
     let mut scene = real_scene(&folder.join("scene.toml"))?;
-    scene.objects = things().into_iter().map(object).collect();
+    scene.objects = objects();
     photograph(scene, PHOTO_RAYS, SENSOR, &folder.join("photo.png"))
 }
 
@@ -184,6 +184,11 @@ fn things() -> Vec<Thing> {
             },
         ),
     ]
+}
+
+/// All that the camera saw.
+pub fn objects() -> Vec<Object> {
+    things().into_iter().map(object).collect()
 }
 
 fn object(thing: Thing) -> Object {

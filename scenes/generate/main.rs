@@ -1,6 +1,7 @@
 //! Makes every file under `scenes/` that is not written by hand: photographs, environments, meshes. The same every time.
 //!
 //! `cargo run --release --example generate_scenes [NAME...]`, names of scenes; all of them without one.
+//! `views DIR`, or `target/views`, makes photographs for measurement (`views.rs`).
 
 mod caustics;
 mod demo;
@@ -9,6 +10,7 @@ mod glb;
 mod mesh;
 mod photograph;
 mod texture;
+mod views;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -20,6 +22,10 @@ const TEST_PHOTO_RAYS: u32 = 256;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let names: Vec<String> = std::env::args().skip(1).collect();
+    if names.first().is_some_and(|name| name == "views") {
+        let target = names.get(1).map_or("target/views", String::as_str);
+        return views::generate(Path::new(target));
+    }
     let wanted = |name: &str| names.is_empty() || names.iter().any(|n| n == name);
     if wanted("demo") {
         demo::generate(&folder("demo"))?;

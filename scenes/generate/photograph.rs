@@ -28,23 +28,35 @@ impl Sensor {
 pub fn real_scene(scene_file: &Path) -> Result<Scene, Box<dyn Error>> {
     let text = std::fs::read_to_string(scene_file)?;
     let folder = scene_file.parent().unwrap_or(Path::new("."));
+    real_scene_of(&text, &["[photo]"], "", folder)
+}
+
+/// The real things of a scene file's text, without some of its tables and with others, its files from `folder`.
+pub fn real_scene_of(
+    text: &str,
+    without: &[&str],
+    with: &str,
+    folder: &Path,
+) -> Result<Scene, Box<dyn Error>> {
     let mut file = tempfile::Builder::new()
         .suffix(".toml")
         .tempfile_in(folder)?;
-    file.write_all(without_table(&text, "[photo]").as_bytes())?;
+    file.write_all(without_tables(text, without).as_bytes())?;
+    file.write_all(with.as_bytes())?;
     let mut scene = scene::load(file.path())?;
     scene.objects.retain(|object| object.side == Side::Real);
     scene.lights.retain(|light| light.side == Side::Real);
     Ok(scene)
 }
 
-/// The TOML text without one table.
-fn without_table(text: &str, header: &str) -> String {
+/// The TOML text without some tables.
+fn without_tables(text: &str, headers: &[&str]) -> String {
     let mut inside = false;
     let mut kept = String::new();
     for line in text.lines() {
         if line.starts_with('[') {
-            inside = line.trim_end() == header;
+            let header = line.split('#').next().unwrap_or("").trim_end();
+            inside = headers.contains(&header);
         }
         if !inside {
             kept += line;

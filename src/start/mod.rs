@@ -27,9 +27,11 @@ pub use claim::Claim;
 pub use compose::{Made, compose};
 pub use depth::DepthUnit;
 pub use exif::focal_px_of_whole;
+pub use lines::{Basis, KnownFocal, Lines, Segment};
 pub use mirror_ball::Ball;
 pub use scan::Scan;
 pub use sun::Shadow;
+pub use view::lines_of;
 
 use std::path::PathBuf;
 

@@ -48,7 +48,7 @@ pub fn sketch(photo: &Photo, camera: &Camera, lines: &Lines) -> Picture {
 mod tests {
     use super::*;
     use crate::start::camera::{camera_over_ground, up_of_pitch};
-    use crate::start::lines::Segment;
+    use crate::start::lines::{Basis, Segment};
 
     #[test]
     fn lines_and_the_horizon_are_drawn() {
@@ -65,7 +65,7 @@ mod tests {
             up,
             up_sigma_deg: 0.5,
             segments: vec![(segment, Some(1))],
-            rms: 0.5,
+            basis: Basis::Lines { rms: 0.5 },
         };
         let picture = sketch(&photo, &camera, &lines);
         let at = |x: usize, y: usize| picture.linear[y * 64 + x];

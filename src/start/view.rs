@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::camera::{camera_over_ground, height_factor, horizon_of_up, up_of_horizon, up_of_pitch};
 use super::depth::DepthMap;
 use super::exif::noted_focal_length;
-use super::lines::{Grey, KnownFocal, Lines, read_lines};
+use super::lines::{Basis, Grey, KnownFocal, Lines, read_lines};
 use super::plane::{Plane, ground_plane};
 use super::{Claim, Request};
 use crate::math::luminance;
@@ -81,8 +81,9 @@ impl View {
     }
 }
 
-/// Lines are looked for in means of blocks of the pixels' codes.
-fn lines_of(photo: &Photo, known: Option<KnownFocal>) -> Option<Lines> {
+/// What a photograph's straight lines and squares say of its camera, in its pixels; `None`: nothing that is sure. They are looked for in means of blocks of
+/// the pixels' codes.
+pub fn lines_of(photo: &Photo, known: Option<KnownFocal>) -> Option<Lines> {
     let block = photo.width.max(photo.height).div_ceil(LINES_SIDE_PX) as usize;
     let (width, height) = (photo.width as usize / block, photo.height as usize / block);
     let codes = (0..width * height).map(|i| {
@@ -107,6 +108,9 @@ fn lines_of(photo: &Photo, known: Option<KnownFocal>) -> Option<Lines> {
     for (segment, _) in &mut lines.segments {
         segment.from *= scale;
         segment.to *= scale;
+    }
+    if let Basis::Squares { off_px, .. } = &mut lines.basis {
+        *off_px *= scale;
     }
     Some(lines)
 }
@@ -153,9 +157,16 @@ fn focal_length(
     match (known, lines) {
         (Some((claim, _)), _) => claim,
         (None, Some(lines)) => {
+            let seen = match lines.basis {
+                Basis::Lines { rms } => format!(
+                    "from straight lines at right angles (drawn in lines.png, {rms:.2} standard deviations rms off)"
+                ),
+                Basis::Squares { corners, off_px } => format!(
+                    "from {corners} corners of equal squares in one plane (drawn in lines.png, {off_px:.2} pixels off)"
+                ),
+            };
             let basis = format!(
-                "from straight lines at right angles (drawn in lines.png, {:.2} standard deviations rms off): {:.0} pixels +- {:.1}%",
-                lines.rms,
+                "{seen}: {:.0} pixels +- {:.1}%",
                 lines.focal_px,
                 100.0 * lines.focal_sigma
             );
@@ -191,8 +202,12 @@ fn direction_up(
         return Claim::new(plane.normal, basis);
     }
     if let Some(lines) = lines {
+        let seen = match lines.basis {
+            Basis::Lines { .. } => "straight lines",
+            Basis::Squares { .. } => "squares",
+        };
         let basis = format!(
-            "from straight lines (drawn in lines.png): +- {:.1} degrees, if what they are taken for is level; else give --horizon",
+            "from {seen} (drawn in lines.png): +- {:.1} degrees, if what they are taken for is level; else give --horizon",
             lines.up_sigma_deg
         );
         return Claim::new(lines.up, basis);

@@ -60,12 +60,18 @@ pub(crate) use canvas::Canvas;
 pub use choice::Choice;
 pub use code::Code;
 pub use detector::{Detector, FrameSeen};
+#[cfg(feature = "start")]
+pub(crate) use edge::refine as refine_quad;
 pub use families::FAMILIES;
 pub use family::Family;
 pub use follow::Follower;
 pub use known_board::{KnownBoard, read_known_board};
+#[cfg(feature = "start")]
+pub(crate) use lattice::find_lattices;
 pub use learning::learn_from;
 pub use lens::Lens;
+#[cfg(feature = "start")]
+pub(crate) use light::LightImage;
 pub use light::{Luma, Tone};
 pub use marker::{Evidence, Marker, Seen, find_markers};
 pub use options::{Readout, Target, TrackOptions};
@@ -73,7 +79,11 @@ pub use pattern::Pattern;
 pub use patterns::{Patterns, USUAL_SHARE};
 pub use pose::{Moved, Pose};
 pub use prepare::prepare;
+#[cfg(feature = "start")]
+pub(crate) use quad::find_quads;
 pub use rolling::Rows;
+#[cfg(feature = "start")]
+pub(crate) use saddle::{blurred, find_saddles, refine_saddle};
 pub use session::{Session, track};
 pub use sight::sight_markers;
 pub use tracker::{Tracked, TrackedFrame, pose_all};

@@ -1,109 +1,87 @@
-//! Focal length and horizon from the straight lines of a photograph: of rooms, streets, tables, whatever has right angles.
+//! Focal length and horizon from the straight lines of a photograph: of rooms, streets, tables, whatever has right angles; or from equal squares in one
+//! plane, which tell more.
 
+mod edges;
+mod guesses;
+mod model;
+mod plane;
+mod refine;
 mod segments;
+mod sheet;
+mod squares;
+mod told;
+mod upright;
 mod vanishing;
 
+pub use model::KnownFocal;
 pub use segments::{Grey, Segment, segments};
-pub use vanishing::KnownFocal;
+pub use told::{Basis, Lines};
 
+use edges::{Edge, edges};
 use glam::DVec3;
-use vanishing::{Axes, MOST_LINES, find_axes};
-
-/// What the lines say.
-#[derive(Clone, Debug)]
-pub struct Lines {
-    pub focal_px: f64,
-    /// Standard deviation, as a share of the focal length.
-    pub focal_sigma: f64,
-    /// Camera space (x right, y up, z back), unit length.
-    pub up: DVec3,
-    pub up_sigma_deg: f64,
-    /// With the axis that each runs along; `None`: elsewhere.
-    pub segments: Vec<(Segment, Option<usize>)>,
-    /// Of the lines that run along an axis, in standard deviations of a line.
-    pub rms: f64,
-}
+use sheet::read_sheet;
+use upright::away_from_ground;
+use vanishing::{Axes, find_axes};
 
 /// Gradients from which on edges are looked for, codes per pixel: what is sharp and noisy wants other ones than what is soft.
-const EDGES: [f32; 3] = [2.0, 3.5, 5.0];
-/// Fits that explain less are chance: of two axes, bits; of the lines' length, a share; of the lines that fit, an rms of three standard deviations'
-/// uniform spread (1.7) or so.
+const EDGES: [f32; 4] = [1.0, 2.0, 3.5, 5.0];
+/// Fits that explain less are chance: of many lines that are taken to be as straight as things are, two axes' bits, and a share of their length; of
+/// few exact ones, bits of all, and a share.
 const LEAST_BITS: f64 = 55.0;
 const LEAST_SHARE: f64 = 0.5;
-const MOST_RMS: f64 = 0.9;
-/// Nothing is claimed that is less sure.
-const MOST_FOCAL_SIGMA: f64 = 0.1;
-const MOST_UP_SIGMA_DEG: f64 = 2.5;
-/// An axis that leans by less from the picture's vertical, as a cosine, is that of walls, if the surface that the lines lie in faces the camera like
-/// one.
-const WALL_VERTICAL: f64 = 0.94;
-const WALL_FACES: f64 = 0.25;
+const LEAST_EVIDENCE: f64 = 12.0;
+const LEAST_EXACT_SHARE: f64 = 0.75;
+/// Fits of other edges with less than this share of the best one's evidence do not count.
+const RIVAL: f64 = 0.7;
 
 /// What the lines of a picture say of its camera; `None`: not enough to be sure.
 pub fn read_lines(grey: &Grey, known: Option<KnownFocal>) -> Option<Lines> {
+    // Where squares leave something open, lines know it no better: most of them are those of the squares.
+    let lines = read_sheet(grey, known).or_else(|| read_axes(grey, known))?;
+    lines.is_sure(known.is_some()).then_some(lines)
+}
+
+/// By lines along axes at right angles.
+fn read_axes(grey: &Grey, known: Option<KnownFocal>) -> Option<Lines> {
     let size = (grey.width as f64, grey.height as f64);
-    let fits: Vec<Lines> = (EDGES.iter())
+    let fits: Vec<(f64, Lines)> = (EDGES.iter())
         .filter_map(|edge| {
-            let segments = segments(grey, *edge);
-            let axes = find_axes(&segments, size, known)?;
-            claim(&axes, segments, known.is_some())
+            let edges = edges(grey, &segments(grey, *edge));
+            let axes = find_axes(&edges, size, known)?;
+            Some((axes.evidence, claim(&axes, edges, known.is_some())?))
         })
         .collect();
-    let best = (fits.iter()).min_by(|a, b| a.focal_sigma.total_cmp(&b.focal_sigma))?;
+    let (evidence, best) = fits.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     // Where other edges say something else, neither is sure.
     let mut sure = best.clone();
-    for other in &fits {
-        let focal = (other.focal_px / best.focal_px).ln().abs();
-        let up_deg = other.up.dot(best.up).clamp(-1.0, 1.0).acos().to_degrees();
-        sure.focal_sigma = sure.focal_sigma.max(focal);
-        sure.up_sigma_deg = sure.up_sigma_deg.max(up_deg);
+    for (own, other) in &fits {
+        if *own >= RIVAL * evidence {
+            sure.doubted_by(other.focal_px, other.up);
+        }
     }
-    is_sure(&sure, known.is_some()).then_some(sure)
+    Some(sure)
 }
 
-fn is_sure(lines: &Lines, focal_is_known: bool) -> bool {
-    (focal_is_known || lines.focal_sigma < MOST_FOCAL_SIGMA)
-        && lines.up_sigma_deg < MOST_UP_SIGMA_DEG
-}
-
-fn claim(axes: &Axes, segments: Vec<Segment>, focal_is_known: bool) -> Option<Lines> {
-    let up = upright(axes);
-    // x right, y down, z ahead to x right, y up, z back.
-    let axis = axes.axes.col(up) * DVec3::new(1.0, -1.0, -1.0);
-    let total: f64 = segments.iter().take(MOST_LINES).map(|s| s.length()).sum();
-    let segments: Vec<(Segment, Option<usize>)> = (segments.into_iter())
+fn claim(axes: &Axes, edges: Vec<Edge>, focal_is_known: bool) -> Option<Lines> {
+    let segments: Vec<(Segment, Option<usize>)> = (edges.into_iter())
+        .map(|edge| edge.segment)
         .zip(axes.runs_along.iter().copied())
         .collect();
-    let explained: f64 = (segments.iter())
-        .filter(|(_, along)| along.is_some())
-        .map(|(segment, _)| segment.length())
-        .sum();
-    let mut bits = axes.bits;
-    bits.sort_by(f64::total_cmp);
+    let mut bits = axes.rough_bits.clone();
+    bits.sort_by(|a, b| b.total_cmp(a));
     let lines = Lines {
         focal_px: axes.focal_px,
         focal_sigma: axes.focal_sigma,
-        up: axis * axis.y.signum(),
-        up_sigma_deg: axes.axis_sigma[up].to_degrees(),
+        // x right, y down, z ahead to x right, y up, z back.
+        up: away_from_ground(axes.up * DVec3::new(1.0, -1.0, -1.0)),
+        up_sigma_deg: axes.up_sigma.to_degrees(),
         segments,
-        rms: axes.rms,
+        basis: Basis::Lines { rms: axes.rms },
     };
-    let explains =
-        bits[1] >= LEAST_BITS && explained >= LEAST_SHARE * total && axes.rms <= MOST_RMS;
-    (explains && is_sure(&lines, focal_is_known)).then_some(lines)
-}
-
-/// Which axis is up. Lines along two axes alone lie in one surface, which carries things, unless it faces the camera like a wall with upright lines;
-/// of three axes it is the one that leans least in the picture.
-fn upright(axes: &Axes) -> usize {
-    let lean = |i: usize| axes.axes.col(i).y.abs();
-    let least = (0..3)
-        .max_by(|a, b| lean(*a).total_cmp(&lean(*b)))
-        .unwrap_or(0);
-    match (0..3).find(|i| axes.bits[*i] == 0.0) {
-        Some(normal) if lean(least) < WALL_VERTICAL || lean(normal) > WALL_FACES => normal,
-        _ => least,
-    }
+    let many = bits[1] >= LEAST_BITS && axes.rough_share >= LEAST_SHARE;
+    let few = axes.evidence >= LEAST_EVIDENCE && axes.share >= LEAST_EXACT_SHARE;
+    let explains = many || few;
+    (explains && lines.is_sure(focal_is_known)).then_some(lines)
 }
 
 #[cfg(test)]

@@ -34,6 +34,18 @@ impl Segment {
 }
 
 impl Grey {
+    /// Bilinear between pixel centres, the border's value beyond. Pixels, corner origin.
+    pub fn at(&self, place: DVec2) -> f64 {
+        let x = (place.x - 0.5).clamp(0.0, self.width as f64 - 1.001);
+        let y = (place.y - 0.5).clamp(0.0, self.height as f64 - 1.001);
+        let (column, row) = (x as usize, y as usize);
+        let (a, b) = (x - column as f64, y - row as f64);
+        let code = |column: usize, row: usize| f64::from(self.codes[row * self.width + column]);
+        let upper = code(column, row) * (1.0 - a) + code(column + 1, row) * a;
+        let lower = code(column, row + 1) * (1.0 - a) + code(column + 1, row + 1) * a;
+        upper * (1.0 - b) + lower * b
+    }
+
     /// Smoothed by 1 4 6 4 1 along both axes: edges of 8-bit pictures are coarse.
     fn smoothed(&self) -> Self {
         let (width, height) = (self.width, self.height);
