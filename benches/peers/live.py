@@ -111,9 +111,10 @@ def paced(arguments, folder, stream, number_of=lambda number: number):
     return json.loads((folder / "stats.json").read_text())["total"], list(memory.values())
 
 
-def in_step(arguments, folder, stream, index):
-    """One frame after the other, every fifth of the video; seconds by part over all frames, and of processor time after the first."""
-    process = begin(arguments, folder, index, "--rpp", "1", "--coarsest", "1")
+def in_step(arguments, folder, stream, index, coarsest=1):
+    """One frame after the other, every fifth of the video, as coarse as may be; seconds by part over all frames, and of processor time after the first two,
+    before which nothing is known of what frames take."""
+    process = begin(arguments, folder, index, "--rpp", "1", "--fps", "100000", "--coarsest", str(coarsest))
     process.stdin.write(stream.header)
     for number in range(arguments.frames):
         process.stdin.write(stream.frame(100 + 5 * number))
@@ -121,13 +122,13 @@ def in_step(arguments, folder, stream, index):
         if number == 0:
             process.stdout.read(len(stream.header))
         process.stdout.read(FRAME_BYTES)
-        if number == 0:
+        if number == 1:
             first = cpu_secs(process)
     used = cpu_secs(process) - first
     process.stdin.close()
     if process.wait() != 0:
         sys.exit("mixray live failed")
-    return json.loads((folder / "stats.json").read_text())["seconds"], used / (arguments.frames - 1)
+    return json.loads((folder / "stats.json").read_text())["seconds"], used / (arguments.frames - 2)
 
 
 def measure(arguments, folder):
@@ -167,7 +168,8 @@ def measure(arguments, folder):
         beside = {part: scale * ms for part, ms in parts.items()} if index == 0 else beside
         lines.append(f"| {name} | {1e3 * used:.0f} | {scale * stage:.0f} |")
     of_which = ", ".join(f"{part} {ms:.0f}" for part, ms in beside.items())
-    lines += ["", f"Without stages, processor ms by part: {of_which} (composite: with the filter).", *PAPERS.rstrip().split("\n")]
+    coarser = ", ".join(f"{1e3 * in_step(arguments, folder, stream, 0, divisor)[1]:.0f}" for divisor in (2, 3, 4))
+    lines += ["", f"Without stages, processor ms by part: {of_which} (composite: with the filter). With sides divided by 2, 3 and 4: {coarser} ms in all.", *PAPERS.rstrip().split("\n")]
     return "\n".join(lines) + "\n", good
 
 
