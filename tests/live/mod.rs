@@ -312,7 +312,8 @@ fn blur_is_of_ways_between_both_thresholds_and_not_of_a_covered_marker() {
             )
         });
         folder.write("scene.toml", format!("{SCENE}{blur}"));
-        let line = "live scene.toml --board board.toml --gamma 2.2 --backend cpu --rpp 1 --hold 100 --stats stats.json";
+        // Runs that are compared are of one size, whatever time they have.
+        let line = "live scene.toml --board board.toml --gamma 2.2 --backend cpu --rpp 1 --coarsest 1 --hold 100 --stats stats.json";
         in_step(&folder, line, &stream)
     };
     let sharp = run(None);
