@@ -160,6 +160,7 @@ fn renderer(scene: &Scene, path: &CameraPath, seed: u32) -> Result<Renderer> {
             time_secs: 0.0,
             seed,
             anchor: None,
+            coarseness: 1,
         },
         &Watcher::none(),
     )?;
@@ -191,6 +192,7 @@ fn average(scene: &Scene, motion: Motion) -> Result<(Vec<[f64; 3]>, Vec<bool>)> 
                 time_secs: 0.0,
                 seed: 1000 + frame,
                 anchor: None,
+                coarseness: 1,
             },
             &Watcher::none(),
         )?;

@@ -8,7 +8,7 @@ use clap::Args;
 use super::scene_flags::SceneFlags;
 use super::terminal::summarize_aside;
 use super::threads::ThreadsFlag;
-use super::track_values::{Chosen, Gamma, family, gamma};
+use super::track_values::{Chosen, Gamma, family, gamma, known_readout};
 use super::values::{above_zero, choice, rays_per_pixel};
 use super::{Failure, Outcome, interrupt, say};
 use crate::live::{LiveEvent, LiveOptions, run_live};
@@ -20,7 +20,7 @@ use crate::video::Matrix;
 
 /// Renders a scene's virtual objects into a running stream, its camera found from markers
 ///
-/// The newest frame wins; those that come meanwhile are dropped and counted. Rays per pixel are fitted into the frame's time. Ctrl-C ends it after a whole frame.
+/// The newest frame wins; those that come meanwhile are dropped and counted. Pictures and their rays are fitted into the frame's time. Ctrl-C ends it after a whole frame.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Scene file (TOML); its photograph is not needed, nor are its intrinsics if --intrinsics brings them
@@ -47,9 +47,15 @@ pub(super) struct Arguments {
     /// How codes become light: auto (the report's, else srgb), srgb, or light is the code to this power
     #[arg(long, value_name = "GAMMA", default_value = "auto", value_parser = gamma)]
     gamma: Gamma,
-    /// Frames a second that rays are fitted to
+    /// From the sensor's first row to its last, such as 20ms (below 0: from the lowest row up); poses are then those of the middle row's time, by the poses before
+    #[arg(long, value_name = "TIME", value_parser = known_readout, allow_hyphen_values = true)]
+    readout_time: Option<f64>,
+    /// Frames a second that pictures and their rays are fitted to
     #[arg(long, value_name = "RATE", default_value = "15", value_parser = above_zero)]
     fps: f64,
+    /// What the sides of a picture may be divided by while the camera moves, where a ray for each pixel does not fit; 1: it is never coarser than the stream
+    #[arg(long, value_name = "N", default_value = "4", value_parser = clap::value_parser!(u32).range(1..=8))]
+    coarsest: u32,
     /// Rays for each pixel at most [default: the scene's]
     #[arg(long, value_name = "N", value_parser = rays_per_pixel(1))]
     rpp: Option<u32>,
@@ -187,7 +193,9 @@ impl Arguments {
             code: self.family.0.map(Code::Family),
             intrinsics: self.intrinsics.clone(),
             tone: self.gamma.0,
+            readout_secs: self.readout_time,
             frame_secs: 1.0 / self.fps,
+            coarsest: self.coarsest,
             hold: self.hold,
             filter: !self.no_filter,
             keep_time: self.keep_time,

@@ -47,6 +47,17 @@ pub(super) fn readout(text: &str) -> Result<Readout, &'static str> {
         .ok_or("expected a time with its unit such as 20ms, or solve")
 }
 
+/// Seconds, where no later frames are there to solve for it.
+pub(super) fn known_readout(text: &str) -> Result<f64, &'static str> {
+    match readout(text) {
+        Ok(Readout::Known(secs)) => Ok(secs),
+        Ok(Readout::Solve) => Err(
+            "it is solved for from whole recordings; expected a time with its unit such as 20ms; find it by mixray track --readout-time solve",
+        ),
+        Err(_) => Err("expected a time with its unit such as 20ms"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -63,6 +74,8 @@ mod tests {
         assert_eq!(readout("20ms"), readout("0.02s"));
         assert_eq!(readout("-8.5 ms"), Ok(Readout::Known(-8.5e-3)));
         assert_eq!(readout("solve"), Ok(Readout::Solve));
+        assert_eq!(known_readout("20ms"), Ok(0.02));
+        assert!(known_readout("solve").is_err_and(|why| why.contains("mixray track")));
         assert!(readout("20").is_err() && readout("infms").is_err() && readout("ms").is_err());
         assert!(gamma("9").is_err() && gamma("1.4").is_ok() && family("hiro").is_err());
     }

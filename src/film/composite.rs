@@ -158,7 +158,7 @@ impl Means {
 
 /// Variance of the mean of the per-sample composite m*im + (1-m)*(im - ir + Ic), from the sum of squares of its first two
 /// terms; the share of the covariance term, which is of second order, is left out.
-fn variance_pixel(sums: &PixelSums, ic: [f32; 3]) -> DVec3 {
+pub(super) fn variance_pixel(sums: &PixelSums, ic: [f32; 3]) -> DVec3 {
     if sums.n == 0 {
         return DVec3::ZERO;
     }

@@ -1,5 +1,6 @@
 //! The newest frame, over and over.
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -8,19 +9,21 @@ use glam::{DMat4, DVec3};
 use super::held_pose::{HeldPose, Placed};
 use super::intake::{Arrived, Intake};
 use super::ray_budget::RayBudget;
-use super::report::{Became, LiveSeconds, LiveStats, Tally};
+use super::report::{Became, Fineness, LiveSeconds, LiveStats, Tally};
+use super::rest::Rest;
 use super::slot::Fetched;
 use super::{LiveError, LiveEvent, LiveFrame, LiveOptions};
 use crate::film::Picture;
 use crate::output::{ExrLayers, picture_codes8};
 use crate::pack::next_anchor;
 use crate::renderer::{
-    Budget, Filter, FrameEdit, NeighbourView, Renderer, RendererOptions, Watcher,
+    Budget, Delivered, Filter, FrameEdit, NeighbourView, Renderer, RendererOptions, Watcher,
 };
 use crate::scene::Composite;
 use crate::scene::trajectory::{CameraPath, FrameName, Intrinsics, read_intrinsics};
 use crate::scene::{
-    Camera, Content, ContentHash, EncodedPhoto, Given, MotionBlurMethod, Photo, Scene, load_with,
+    Camera, Content, ContentHash, EncodedPhoto, Given, MotionBlurMethod, Object, Photo, Scene,
+    load_with,
 };
 use crate::stages::{Finished, GpuStages, finish};
 use crate::tracking::{Follower, KnownBoard, Lens, Luma, read_known_board};
@@ -53,7 +56,7 @@ pub fn run_live(
         begin,
         rate: intake.header.frames_per_second(),
         held: HeldPose::new(options.hold),
-        budget: RayBudget::new(options.frame_secs, 1),
+        budget: RayBudget::new(options.frame_secs, 1, 1),
         tally: Tally::default(),
         started: None,
         sink: None,
@@ -152,10 +155,18 @@ struct Started {
     before: Option<(f64, DMat4)>,
     /// The last frame taken up.
     number: Option<u32>,
+    rest: Rest,
     /// Until the first pose, ...
     scene: Option<Scene>,
     /// ... and from then on.
     running: Option<Running>,
+}
+
+/// Where the camera of a frame is.
+struct Standing {
+    camera: Camera,
+    /// It has been there for a while.
+    rests: bool,
 }
 
 struct Running {
@@ -227,7 +238,7 @@ impl Live<'_> {
             None => self.start(&photo)?,
         };
         clock.lap();
-        let found = started.follower.follow(&luma);
+        let found = started.follower.follow(&luma, number);
         let pose = found.map_err(|why| self.tally.lacks_pose(why)).ok();
         let pose = pose.map(|pose| pose.world_from_camera());
         let placed = self.held.place(pose, at.duration_since(self.begin));
@@ -251,26 +262,34 @@ impl Live<'_> {
                 Became::PassedThrough
             }
             Some(world_from_camera) => {
-                let rays_per_pixel = self.budget.rays();
                 let is_first = started.running.is_none();
-                let picture = self.render(
-                    &mut started,
+                let camera = Camera {
                     world_from_camera,
-                    &frame.photo,
-                    number,
-                    &mut seconds,
-                )?;
+                    ..started.camera.clone()
+                };
+                let rests = match placed {
+                    Placed::Seen(_) => {
+                        let since = at.duration_since(self.begin);
+                        started.rest.seen(&camera, since.as_secs_f64())
+                    }
+                    _ => {
+                        started.rest.lost();
+                        false
+                    }
+                };
+                let standing = Standing { camera, rests };
+                let (picture, fineness) =
+                    self.render(&mut started, standing, &frame.photo, number, &mut seconds)?;
                 clock.lap();
                 self.write(&name, &picture, &frame)?;
                 seconds.write = clock.lap();
                 // The first frame also waited for the scene's trees.
                 if !is_first {
-                    let beside = seconds.total() - seconds.render;
-                    self.budget.took(seconds.render, beside);
+                    self.budget.took(&seconds);
                 }
                 match placed {
-                    Placed::Held(_) => Became::Held { rays_per_pixel },
-                    _ => Became::Rendered { rays_per_pixel },
+                    Placed::Held(_) => Became::Held(fineness),
+                    _ => Became::Rendered(fineness),
                 }
             }
         };
@@ -292,7 +311,8 @@ impl Live<'_> {
         for warning in &scene.warnings {
             (self.hear)(&LiveEvent::Warning(warning));
         }
-        self.budget = RayBudget::new(options.frame_secs, scene.settings.rays_per_pixel);
+        let most = scene.settings.rays_per_pixel;
+        self.budget = RayBudget::new(options.frame_secs, most, options.coarsest);
         let camera = scene.camera.clone();
         let lens = Lens {
             focal: [camera.fx, camera.fy].into(),
@@ -300,32 +320,34 @@ impl Live<'_> {
             distortion: camera.distortion,
         };
         let known = self.known.clone();
+        let follower = Follower::new(known, options.code.clone(), lens, options.tone);
         Ok(Started {
-            follower: Follower::new(known, options.code.clone(), lens, options.tone),
+            follower: match options.readout_secs {
+                Some(secs) => follower.with_readout(secs, self.rate)?,
+                None => follower,
+            },
             lens: scene.lens,
             camera,
             seed: scene.settings.seed,
             anchor: None,
             before: None,
             number: None,
+            rest: Rest::default(),
             scene: Some(scene),
             running: None,
         })
     }
 
-    /// The finished picture of a frame seen from there.
+    /// The finished picture of a frame, and how finely it was rendered.
     fn render(
-        &self,
+        &mut self,
         started: &mut Started,
-        world_from_camera: DMat4,
+        Standing { camera, rests }: Standing,
         photo: &Photo,
         number: u32,
         seconds: &mut LiveSeconds,
-    ) -> Result<Picture, LiveError> {
-        let camera = Camera {
-            world_from_camera,
-            ..started.camera.clone()
-        };
+    ) -> Result<(Picture, Fineness), LiveError> {
+        let world_from_camera = camera.world_from_camera;
         let time_secs = match self.rate {
             Some(rate) => f64::from(number) / rate,
             None => self.begin.elapsed().as_secs_f64(),
@@ -348,6 +370,8 @@ impl Live<'_> {
             notes,
         } = started.running.insert(running);
         clock.lap();
+        let stands = !renderer.scene().objects.iter().any(Object::is_animated);
+        let coarseness = self.budget.coarseness(rests && stands);
         let edit = FrameEdit {
             photo: Some(photo.clone()),
             camera,
@@ -356,14 +380,22 @@ impl Live<'_> {
             time_secs,
             seed: started.seed.wrapping_add(number),
             anchor: started.anchor,
+            coarseness,
         };
         renderer.set_frame(edit, &Watcher::none())?;
         seconds.edit = clock.lap();
-        let pixels = u64::from(photo.width) * u64::from(photo.height);
-        let rays = Budget::Rays(pixels * u64::from(self.budget.rays()));
-        renderer.advance(rays, &Watcher::none())?;
+        let rays = (self.budget).rays(renderer.samples_of_a_ray(), seconds.total());
+        let pixels = renderer.film().pixels.len() as u64;
+        let all = Budget::Rays(pixels * u64::from(rays));
+        renderer.advance(all, &Watcher::none())?;
         seconds.render = clock.lap();
-        let picture = renderer.delivered_picture();
+        let (picture, film) = match coarseness {
+            1 => (renderer.delivered_picture(), Cow::Borrowed(renderer.film())),
+            _ => {
+                let Delivered { picture, film, .. } = renderer.delivered();
+                (picture, film)
+            }
+        };
         seconds.composite = clock.lap();
         let wants_motion = (renderer.scene().stages.motion_blur)
             .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);
@@ -373,7 +405,6 @@ impl Live<'_> {
                 time_secs,
             })
         });
-        let film = renderer.film();
         let Finished {
             picture,
             notes: told,
@@ -381,7 +412,7 @@ impl Live<'_> {
             seconds: of_stages,
         } = finish(
             picture,
-            film,
+            &film,
             renderer.scene(),
             number,
             motion.as_ref(),
@@ -398,7 +429,11 @@ impl Live<'_> {
             }
         }
         *notes = all.len();
-        Ok(picture)
+        let fineness = Fineness {
+            rays_per_pixel: f64::from(rays) / f64::from(coarseness.pow(2)),
+            coarseness,
+        };
+        Ok((picture, fineness))
     }
 
     fn close_window(&mut self, began: &mut Instant) {

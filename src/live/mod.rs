@@ -1,7 +1,7 @@
 //! A running stream augmented as it comes.
 //!
-//! A thread reads the stream into one place, where the newest frame wins; this one takes it from there, finds the camera from the markers in it, renders with
-//! as many rays as the frame's time allows, and writes. So the age of what goes out does not grow, however long it runs.
+//! A thread reads the stream into one place, where the newest frame wins; this one takes it from there, finds the camera from the markers in it, renders as
+//! finely and with as many rays as the frame's time allows, and writes. So the age of what goes out does not grow, however long it runs.
 
 mod ages;
 mod driver;
@@ -9,6 +9,7 @@ mod held_pose;
 mod intake;
 mod ray_budget;
 mod report;
+mod rest;
 mod slot;
 
 use std::path::PathBuf;
@@ -45,8 +46,12 @@ pub struct LiveOptions {
     pub intrinsics: Option<PathBuf>,
     /// In place of the board's.
     pub tone: Option<Tone>,
-    /// The time that rays are fitted into.
+    /// What the sensor takes from its first row to its last (below 0: from the lowest up); `None`: all rows are of one time.
+    pub readout_secs: Option<f64>,
+    /// The time that pictures and rays are fitted into.
     pub frame_secs: f64,
+    /// What the sides of a picture may be divided by while the camera moves, so that it fits; 1: it is never coarser than the stream.
+    pub coarsest: u32,
     /// How long the last pose stands for those that are not found.
     pub hold: Duration,
     /// The difference is smoothed, as few rays call for.

@@ -84,8 +84,10 @@ pub struct LiveWindow {
     pub age: AgeSpread,
     /// The part of it in which the frame was not worked on.
     pub wait: AgeSpread,
-    /// Of rendered frames, mean.
+    /// Of rendered frames, mean, for each pixel of the stream.
     pub rays_per_pixel: f64,
+    /// What the sides of rendered pictures were divided by, mean.
+    pub coarseness: f64,
     /// Of processing, without waiting: mean of a frame, ...
     pub work_ms: f64,
     /// ... and how frames differ in it.
@@ -105,13 +107,14 @@ impl LiveWindow {
             ..
         } = self.frames;
         let mut text = format!(
-            "{:.1} of {:.1} frames/s, age {:.0} ms, p95 {:.0}, work {:.0}; {:.1} rays per pixel; {dropped} dropped, {held} with the pose before, {passed_through} without one",
+            "{:.1} of {:.1} frames/s, age {:.0} ms, p95 {:.0}, work {:.0}; {:.2} rays per pixel, sides divided by {:.1}; {dropped} dropped, {held} with the pose before, {passed_through} without one",
             self.frames.written() as f64 / self.seconds,
             arrived as f64 / self.seconds,
             self.age.median_ms,
             self.age.p95_ms,
             self.work_ms,
             self.rays_per_pixel,
+            self.coarseness,
         );
         let most = self.without_pose.iter().max_by_key(|(_, count)| **count);
         if let Some((why, _)) = most {
@@ -171,7 +174,8 @@ struct Sums {
     ages: Ages,
     waits: Ages,
     works: Ages,
-    rays_per_pixel: u64,
+    rays_per_pixel: f64,
+    coarseness: f64,
     work_secs: f64,
     without_pose: BTreeMap<String, u64>,
 }
@@ -184,7 +188,8 @@ impl Sums {
             frames,
             age: self.ages.spread(),
             wait: self.waits.spread(),
-            rays_per_pixel: self.rays_per_pixel as f64 / rendered,
+            rays_per_pixel: self.rays_per_pixel / rendered,
+            coarseness: self.coarseness / rendered,
             work_ms: 1e3 * self.work_secs / self.ages.len().max(1) as f64,
             work: self.works.spread(),
             without_pose: self.without_pose.clone(),
@@ -196,6 +201,7 @@ impl Sums {
         self.waits.extend(&other.waits);
         self.works.extend(&other.works);
         self.rays_per_pixel += other.rays_per_pixel;
+        self.coarseness += other.coarseness;
         self.work_secs += other.work_secs;
         for (why, count) in &other.without_pose {
             *self.without_pose.entry(why.clone()).or_default() += count;
@@ -203,11 +209,20 @@ impl Sums {
     }
 }
 
+/// How finely a frame was rendered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fineness {
+    /// For each pixel of the stream.
+    pub rays_per_pixel: f64,
+    /// What the sides of its picture were divided by.
+    pub coarseness: u32,
+}
+
 /// How a frame came to its picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Became {
-    Rendered { rays_per_pixel: u32 },
-    Held { rays_per_pixel: u32 },
+    Rendered(Fineness),
+    Held(Fineness),
     PassedThrough,
 }
 
@@ -217,21 +232,15 @@ impl Tally {
     }
 
     pub fn add(&mut self, became: Became, age_secs: f64, seconds: &LiveSeconds) {
-        let rays_per_pixel = match became {
-            Became::Rendered { rays_per_pixel } => {
-                self.counts.rendered += 1;
-                rays_per_pixel
-            }
-            Became::Held { rays_per_pixel } => {
-                self.counts.held += 1;
-                rays_per_pixel
-            }
-            Became::PassedThrough => {
-                self.counts.passed_through += 1;
-                0
-            }
-        };
-        self.window.rays_per_pixel += u64::from(rays_per_pixel);
+        match became {
+            Became::Rendered(_) => self.counts.rendered += 1,
+            Became::Held(_) => self.counts.held += 1,
+            Became::PassedThrough => self.counts.passed_through += 1,
+        }
+        if let Became::Rendered(fineness) | Became::Held(fineness) = became {
+            self.window.rays_per_pixel += fineness.rays_per_pixel;
+            self.window.coarseness += f64::from(fineness.coarseness);
+        }
         self.window.ages.add(age_secs);
         self.window.waits.add(age_secs - seconds.total());
         self.window.works.add(seconds.total());

@@ -8,19 +8,17 @@ use crate::packed::{
     FRAME_BACKDROP, Frame, MATERIAL_LAMBERTIAN, MATERIAL_QUAD_LIGHT, MATERIAL_UNLIT, NONE,
     PackedScene,
 };
-use crate::scene::{Backdrop, Scene};
+use crate::scene::{Backdrop, Photo};
 
 /// Between the pixels whose depth is looked at.
 const PITCH_PX: usize = 8;
 
 impl PackedScene {
-    /// Shows the photograph to the paths that may see it, as the scene asks. Wants camera and geometry packed.
-    pub fn set_backdrop(&mut self, scene: &Scene) {
+    /// Shows the photograph, of the frame's size, to the paths that may see it. Wants camera and geometry packed.
+    pub fn set_backdrop(&mut self, photo: Option<&Photo>, backdrop: Backdrop) {
         self.frame.flags &= !FRAME_BACKDROP;
         self.backdrop.clear();
-        let (Some(photo), Backdrop::Photograph(distance_m)) =
-            (&scene.photo, scene.settings.backdrop)
-        else {
+        let (Some(photo), Backdrop::Photograph(distance_m)) = (photo, backdrop) else {
             return;
         };
         if !self.is_looked_through() {

@@ -17,7 +17,8 @@ use crate::packed::{
     SAMPLER_SOBOL, Triangle, Vertex,
 };
 use crate::scene::{
-    EnvironmentMap, Estimator, Exposure, Instance, LightKind, Material, SamplerKind, Scene, Side,
+    Camera, EnvironmentMap, Estimator, Exposure, Instance, Lens, LightKind, Material, SamplerKind,
+    Scene, Side,
 };
 use crate::work::{Meter, Phase, Watcher};
 
@@ -197,15 +198,15 @@ impl PackedScene {
 
     /// Camera and lens; nothing else depends on them but the pilot.
     pub fn set_camera(&mut self, scene: &Scene) {
-        frame_camera(
-            &scene.camera,
-            &scene.lens,
-            DVec3::from(self.anchor_m),
-            &mut self.frame,
-        );
+        self.set_view(&scene.camera, &scene.lens);
+    }
+
+    /// The same of a camera that need not be the scene's.
+    pub fn set_view(&mut self, camera: &Camera, lens: &Lens) {
+        frame_camera(camera, lens, DVec3::from(self.anchor_m), &mut self.frame);
         self.frame.flags &= !(FRAME_SHUTTER | FRAME_SHUTTER_ORDERED);
         (self.frame.shutter_open, self.frame.shutter_row) = (1.0, 0.0);
-        let count = scene.camera.width as usize * scene.camera.height as usize;
+        let count = camera.width as usize * camera.height as usize;
         self.pixels = vec![PixelInfo::uniform(PIXEL_BEAM_MAY_MEET_VIRTUAL); count];
     }
 

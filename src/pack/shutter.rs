@@ -33,7 +33,7 @@ impl PackedScene {
             return;
         };
         let open = shutter.open_share();
-        let rows = f64::from(scene.camera.height.max(2) - 1);
+        let rows = f64::from(self.frame.height.max(2) - 1);
         self.frame.shutter_open = open as f32;
         self.frame.shutter_row = ((1.0 - open) / rows) as f32;
         let (opens, closes) = shutter.interval_secs();
@@ -159,10 +159,9 @@ fn fastest_step_px(scene: &Scene, opens: f64, closes: f64) -> f64 {
     longest
 }
 
-/// The samples of a pixel of each row that lie before the end of an instant, in rays per pixel of `total`.
-pub fn row_ends(scene: &Scene, instant: &Instant, total: u32) -> Vec<u32> {
+/// The samples of a pixel of each of `height` rows that lie before the end of an instant, in rays per pixel of `total`.
+pub fn row_ends(scene: &Scene, height: u32, instant: &Instant, total: u32) -> Vec<u32> {
     let open = traced_shutter(scene).map_or(1.0, |shutter| shutter.open_share());
-    let height = scene.camera.height;
     let rows = f64::from(height.max(2) - 1);
     (0..height)
         .map(|row| {

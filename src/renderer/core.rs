@@ -12,8 +12,8 @@ use crate::cpu::{self, LensGrid};
 use crate::film::Film;
 use crate::gpu::GpuError;
 use crate::pack::PackError;
-use crate::packed::{PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
-use crate::scene::{Composite, Scene};
+use crate::packed::{Frame, PIXEL_OUT_OF_REACH, PackedScene, PixelInfo};
+use crate::scene::{Composite, Photo, Scene};
 use crate::work::{
     Meter, Phase, PhotonWork, Place, Places, Progress, RayCounts, Watcher, WorkList,
 };
@@ -32,6 +32,8 @@ pub(super) struct Core {
     pub places: Places,
     /// Things the user should hear: fallbacks taken, values fitted.
     pub notes: Vec<String>,
+    /// The photograph in the size of a coarser frame.
+    pub coarse_photo: Option<Photo>,
     /// Of a draft: other exposures and cameras make do with it.
     pub photo_light: Option<PhotoLight>,
     /// Share of the light of virtual pixels that comes from the photograph as their backdrop.
@@ -175,6 +177,11 @@ impl Core {
         !self.packed.pixels.iter().any(is_within_reach)
     }
 
+    /// The photograph in the size that is traced.
+    pub fn traced_photo(&self) -> Option<&Photo> {
+        photo_of_size(&self.scene, self.coarse_photo.as_ref(), &self.packed.frame)
+    }
+
     /// Rays per pixel that every pixel within reach has taken; `None`: there is no such pixel.
     pub fn samples(&self) -> Option<u32> {
         let pixels = self.film.pixels.iter().zip(&self.packed.pixels);
@@ -188,6 +195,16 @@ impl Core {
         self.seconds.render += stopwatch.secs();
         self.seconds.cpu += stopwatch.cpu_secs();
     }
+}
+
+/// Of the scene's photograph and one of a coarser frame, that of the frame's size.
+pub(super) fn photo_of_size<'a>(
+    scene: &'a Scene,
+    coarse: Option<&'a Photo>,
+    frame: &Frame,
+) -> Option<&'a Photo> {
+    let fits = |photo: &&Photo| (photo.width, photo.height) == (frame.width, frame.height);
+    coarse.filter(fits).or(scene.photo.as_ref())
 }
 
 /// The whole scene, packed as the options ask.

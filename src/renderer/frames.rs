@@ -28,6 +28,8 @@ pub struct FrameEdit {
     /// Where coordinates have their origin, world space, near the camera ([`next_anchor`]); `None`: as few new ones as can be. The last bits of
     /// the picture depend on it, and everything is packed anew for a new one.
     pub anchor: Option<DVec3>,
+    /// The sides of what is traced are those of the camera divided by this, 1 or more; pictures are enlarged to the camera's size.
+    pub coarseness: u32,
 }
 
 impl Renderer {
@@ -50,13 +52,22 @@ impl Renderer {
             let scale = f64::from(core.packed.frame.exposure_scale);
             core.scene.settings.exposure = Exposure::Ev(scale.log2());
         }
-        let seen = match &edit.photo {
-            Some(_) => Changed::Photo,
-            None => Changed::View,
+        let traced = edit.camera.coarser(edit.coarseness);
+        let traced_size = (traced.width, traced.height);
+        let is_resized = traced_size != (core.packed.frame.width, core.packed.frame.height);
+        let seen = match edit.photo.is_some() || is_resized {
+            true => Changed::Photo,
+            false => Changed::View,
         };
         if let Some(photo) = edit.photo {
             core.scene.photo = Some(photo);
         }
+        core.coarse_photo = match traced_size == size {
+            true => None,
+            false => {
+                (core.scene.photo.as_ref()).map(|photo| photo.averaged(traced.width, traced.height))
+            }
+        };
         core.scene.camera = edit.camera;
         core.scene.lens = edit.lens;
         core.scene.camera_path = edit.camera_path;
@@ -92,9 +103,10 @@ impl Renderer {
         });
         if anchor != DVec3::from(core.packed.anchor_m) {
             core.pack_at(anchor, watcher)?;
+            core.packed.set_view(&traced, &core.scene.lens);
             return self.restart(true, Changed::All, watcher);
         }
-        core.packed.set_camera(&core.scene);
+        core.packed.set_view(&traced, &core.scene.lens);
         if moved {
             core.pack_moving(watcher)?;
             return self.restart(true, Changed::Moving, watcher);

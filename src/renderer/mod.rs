@@ -238,6 +238,7 @@ impl Renderer {
                 seconds: Seconds::default(),
                 places: Places::default(),
                 notes: Vec::new(),
+                coarse_photo: None,
                 photo_light: None,
                 backdrop_share: None,
                 secs_per_ray: None,
@@ -302,6 +303,16 @@ impl Renderer {
         self.core.samples().unwrap_or(all)
     }
 
+    /// Samples that one ray per pixel takes, in all pixels within reach of something virtual.
+    pub fn samples_of_a_ray(&self) -> u64 {
+        let Core { film, packed, .. } = &self.core;
+        let pixels = film.pixels.iter().zip(&packed.pixels);
+        pixels
+            .filter(|(_, info)| core::is_within_reach(info))
+            .map(|(sums, _)| u64::from(sums.sample_factor.max(1)))
+            .sum()
+    }
+
     /// The savings that it does without.
     pub fn without(&self) -> Without {
         self.core.options.without
@@ -311,6 +322,7 @@ impl Renderer {
         self.core.options.filter
     }
 
+    /// Of the size that is traced, which [`FrameEdit::coarseness`] divides.
     pub fn film(&self) -> &Film {
         &self.core.film
     }

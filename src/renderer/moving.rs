@@ -96,7 +96,9 @@ fn photons_end(core: &Core, instant: &Instant, end: u32) -> u64 {
 
 /// By row, the samples before the end of an instant, in rays per pixel.
 fn ends_of(core: &Core, instant: &Instant) -> Vec<u32> {
-    row_ends(&core.scene, instant, core.scene.settings.rays_per_pixel)
+    let Core { scene, packed, .. } = core;
+    let total = scene.settings.rays_per_pixel;
+    row_ends(scene, packed.frame.height, instant, total)
 }
 
 /// Moves the objects to where they are at an instant.

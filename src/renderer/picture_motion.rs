@@ -4,8 +4,10 @@ use glam::{DMat4, DVec3};
 use rayon::prelude::*;
 
 use super::Renderer;
+use super::core::Core;
 use crate::accel::Ray;
 use crate::camera::lens::camera_ray;
+use crate::film::nearest;
 use crate::packed::{Frame, NONE};
 use crate::scene::projection::project;
 use crate::scene::{Camera, Object, Side};
@@ -47,7 +49,7 @@ impl Renderer {
             })
             .collect();
         PictureMotion {
-            objects: self.objects_of_pixels(),
+            objects: self.objects_of_the_camera(),
             blurs,
         }
     }
@@ -60,6 +62,18 @@ impl Renderer {
             project(&self.core.scene.camera, now)?,
             project(before, then)?,
         ))
+    }
+
+    /// By pixel of the camera, of which fewer may be traced.
+    fn objects_of_the_camera(&self) -> Vec<u32> {
+        let Core { film, scene, .. } = &self.core;
+        let camera = &scene.camera;
+        let from = [film.width, film.height];
+        nearest(
+            &self.objects_of_pixels(),
+            from,
+            [camera.width, camera.height],
+        )
     }
 
     fn objects_of_pixels(&self) -> Vec<u32> {

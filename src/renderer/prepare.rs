@@ -1,10 +1,11 @@
 //! What precedes the first sample: after the scene is packed, or after an edit.
 
 use super::backend::Backend;
-use super::core::Core;
+use super::core::{Core, photo_of_size};
 use super::stopwatch::Stopwatch;
 use super::{RenderError, Renderer, photo_albedo};
 use crate::cpu::{self, LensGrid};
+use crate::film::Film;
 use crate::gpu::Changed;
 use crate::packed::{FRAME_AOVS, MATERIAL_PHOTO_ALBEDO, PackedScene};
 use crate::scene::{BackendChoice, Composite, Exposure, Scene};
@@ -92,7 +93,8 @@ impl Renderer {
         }
         let from_photo = (core.packed.materials.iter())
             .any(|material| material.flags & MATERIAL_PHOTO_ALBEDO != 0);
-        let Some(photo) = &core.scene.photo else {
+        let coarse = core.coarse_photo.as_ref();
+        let Some(photo) = photo_of_size(&core.scene, coarse, &core.packed.frame) else {
             return;
         };
         if core.scene.settings.exposure == Exposure::Auto {
@@ -134,7 +136,8 @@ impl Renderer {
     /// [`roughly_fitted_exposure_ev`] of the scene that is rendered.
     pub fn roughly_fitted_exposure_ev(&mut self) -> Option<f64> {
         let core = &mut self.core;
-        let photo = core.scene.photo.as_ref()?;
+        let coarse = core.coarse_photo.as_ref();
+        let photo = photo_of_size(&core.scene, coarse, &core.packed.frame)?;
         if core.scene.settings.exposure == Exposure::Auto {
             return None;
         }
@@ -170,7 +173,10 @@ impl Renderer {
         let without = core.options.without;
         without.apply_to_frame(&mut core.packed.frame);
         let begun = core.places.begin();
-        core.packed.set_backdrop(&core.scene);
+        let coarse = core.coarse_photo.as_ref();
+        let photo = photo_of_size(&core.scene, coarse, &core.packed.frame);
+        let backdrop = core.scene.settings.backdrop;
+        core.packed.set_backdrop(photo, backdrop);
         let begun = core.places.end(Place::Backdrop, begun);
         cpu::pilot(&mut core.packed, core.lens_grid.as_ref(), &meter);
         without.apply_to_pixels(&mut core.packed.pixels);
@@ -184,8 +190,12 @@ impl Renderer {
             false => cpu::backdrop_share(&mut core.packed),
         };
         let begun = core.places.end(Place::Backdrop, begun);
-        // Of a film that no ray was traced for, memory is not committed.
-        if core.rays.traced() > 0 {
+        let (width, height) = (core.packed.frame.width, core.packed.frame.height);
+        if (core.film.width, core.film.height) != (width, height) {
+            let first = core.film.first_sample;
+            core.film = Film::new(width, height, first, core.options.guides);
+        } else if core.rays.traced() > 0 {
+            // Of a film that no ray was traced for, memory is not committed.
             core.film.renew();
         }
         let factors = core.packed.pixels.iter().map(|p| p.sample_factor);

@@ -7,7 +7,8 @@ use super::{Filter, Renderer};
 use crate::cpu::estimator::evaluations_before;
 use crate::film::{
     Combined, Film, GROUPS, Picture, Planes, combine_robustly, composite, composite_smoothed,
-    estimated_error, filter_difference, filter_finally, group_counts, planes, smoothed_difference,
+    enlarged, estimated_error, filter_difference, filter_finally, group_counts, planes,
+    smoothed_difference,
 };
 use crate::scene::Composite;
 
@@ -15,7 +16,7 @@ use crate::scene::Composite;
 #[derive(Clone, Debug)]
 pub struct Delivered<'a> {
     pub picture: Picture,
-    /// The film that it is composited from.
+    /// The film that it is composited from, of the camera's size.
     pub film: Cow<'a, Film>,
     /// Of the difference in real pixels, the share that the robust combination gave to other pixels nearby; `None` for means.
     pub moved: Option<f64>,
@@ -31,17 +32,34 @@ impl Renderer {
         }
     }
 
+    /// Less is traced than the camera has pixels.
+    fn is_coarse(&self) -> bool {
+        let Core { film, scene, .. } = &self.core;
+        (film.width, film.height) != (scene.camera.width, scene.camera.height)
+    }
+
+    /// The film in the size of the camera.
+    fn whole<'a>(&self, film: Cow<'a, Film>) -> Cow<'a, Film> {
+        if !self.is_coarse() {
+            return film;
+        }
+        let camera = &self.core.scene.camera;
+        let mode = self.core.scene.settings.composite;
+        Cow::Owned(enlarged(&film, camera.width, camera.height, mode))
+    }
+
     /// The film composited over the photograph: means of the samples.
     pub fn picture(&self) -> Picture {
         let Core { film, scene, .. } = &self.core;
         match self.core.options.filter {
-            Some(Filter::Preview) => composite_smoothed(
+            Some(Filter::Preview) if !self.is_coarse() => composite_smoothed(
                 film,
                 &smoothed_difference(film, &self.surfaces),
                 scene.photo.as_ref(),
                 scene.settings.composite,
             ),
-            Some(Filter::Final) | None => self.composited(film),
+            Some(Filter::Preview) => self.composited(&self.whole(self.shown())),
+            Some(Filter::Final) | None => self.composited(&self.whole(Cow::Borrowed(film))),
         }
     }
 
@@ -50,7 +68,7 @@ impl Renderer {
         let film = &self.core.film;
         // A quotient multiplies the photograph, whose grain would come into the difference as well.
         let photo = match self.core.scene.settings.composite {
-            Composite::Additive => self.core.scene.photo.as_ref(),
+            Composite::Additive => self.core.traced_photo(),
             Composite::Quotient => None,
         };
         let counts = |pixel| self.group_counts(pixel);
@@ -65,6 +83,7 @@ impl Renderer {
             }
             Some(Filter::Preview) | None => (self.shown(), None),
         };
+        let film = self.whole(film);
         Delivered {
             picture: self.composited(&film),
             film,
@@ -101,9 +120,9 @@ impl Renderer {
         )
     }
 
-    /// The variance plane is that of the scrambles where there are any, else that of the samples.
+    /// Of the size that is traced. The variance plane is that of the scrambles where there are any, else that of the samples.
     pub fn planes(&self) -> Planes {
-        let mut planes = planes(&self.shown(), self.core.scene.photo.as_ref());
+        let mut planes = planes(&self.shown(), self.core.traced_photo());
         if let Some(stated) = &self.stated {
             planes.variance.clone_from(&stated.variance);
         }
@@ -115,7 +134,7 @@ impl Renderer {
     pub fn error(&self) -> f64 {
         match &self.stated {
             Some(stated) => stated.rms(),
-            None => estimated_error(&self.core.film, self.core.scene.photo.as_ref()),
+            None => estimated_error(&self.core.film, self.core.traced_photo()),
         }
     }
 }

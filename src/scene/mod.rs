@@ -6,6 +6,7 @@
 pub mod animation;
 mod camera;
 pub mod check;
+mod coarser;
 pub mod deformation;
 mod environment;
 pub(crate) mod error;

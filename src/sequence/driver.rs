@@ -283,6 +283,7 @@ impl Sequence<'_> {
                 time_secs,
                 seed: started.seed.wrapping_add(name.number),
                 anchor: self.anchor,
+                coarseness: 1,
             },
             &Watcher::none(),
         )?;

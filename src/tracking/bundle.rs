@@ -4,7 +4,7 @@
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Dyn, Matrix6, OMatrix, U6, Vector6};
 
-use super::frame_pose::{Observation, project, robust};
+use super::frame_pose::{COVARIANCE_SHARE, Observation, project, robust};
 use super::lens::{LENS_PARAMETERS, Lens};
 use super::pose::Pose;
 use crate::least_squares::{Descending, Descent};
@@ -250,13 +250,42 @@ impl Problem<'_> {
         })
     }
 
+    /// Blocks of the frames, and the shared system before they are eliminated, in which priors count so many times.
+    fn system(&self, priors_by: f64) -> <Self as Descending>::Linearised {
+        let size = LENS_PARAMETERS + 3 * self.points.len();
+        let mut information = DMatrix::zeros(size, size);
+        let mut slope = DVector::zeros(size);
+        let mut blocks = Vec::with_capacity(self.views.len());
+        for view in &self.views {
+            blocks.push(self.block(view, &mut information, &mut slope));
+        }
+        let shared = self.shared();
+        for prior in self.priors {
+            let (error, slopes) = prior.error(&shared);
+            for (i, by_i) in &slopes {
+                slope[*i] -= priors_by * error * by_i;
+                for (j, by_j) in &slopes {
+                    information[(*i, *j)] += priors_by * by_i * by_j;
+                }
+            }
+        }
+        for fixed in (0..size).filter(|parameter| !self.is_free(*parameter)) {
+            information.row_mut(fixed).fill(0.0);
+            information.column_mut(fixed).fill(0.0);
+            information[(fixed, fixed)] = 1.0;
+            slope[fixed] = 0.0;
+        }
+        (blocks, information, slope)
+    }
+
     fn covariance(&self) -> Option<DMatrix<f64>> {
-        let (blocks, mut reduced, _) = self.linearised();
+        // Weights make too little of the frames' information, not of the priors'.
+        let (blocks, mut reduced, _) = self.system(COVARIANCE_SHARE);
         for block in &blocks {
             let mixed = block.factor(0.0)?.solve(&block.mixed);
             block.eliminate(&mixed, &mut reduced);
         }
-        let mut covariance = reduced.cholesky()?.inverse();
+        let mut covariance = COVARIANCE_SHARE * reduced.cholesky()?.inverse();
         for fixed in (0..covariance.nrows()).filter(|k| !self.is_free(*k)) {
             covariance[(fixed, fixed)] = 0.0;
         }
@@ -289,32 +318,8 @@ impl Descending for Problem<'_> {
         known + views.sum::<f64>()
     }
 
-    /// Blocks of the frames, and the shared system before they are eliminated.
     fn linearised(&self) -> Self::Linearised {
-        let size = LENS_PARAMETERS + 3 * self.points.len();
-        let mut information = DMatrix::zeros(size, size);
-        let mut slope = DVector::zeros(size);
-        let mut blocks = Vec::with_capacity(self.views.len());
-        for view in &self.views {
-            blocks.push(self.block(view, &mut information, &mut slope));
-        }
-        let shared = self.shared();
-        for prior in self.priors {
-            let (error, slopes) = prior.error(&shared);
-            for (i, by_i) in &slopes {
-                slope[*i] -= error * by_i;
-                for (j, by_j) in &slopes {
-                    information[(*i, *j)] += by_i * by_j;
-                }
-            }
-        }
-        for fixed in (0..size).filter(|parameter| !self.is_free(*parameter)) {
-            information.row_mut(fixed).fill(0.0);
-            information.column_mut(fixed).fill(0.0);
-            information[(fixed, fixed)] = 1.0;
-            slope[fixed] = 0.0;
-        }
-        (blocks, information, slope)
+        self.system(1.0)
     }
 
     fn stepped(

@@ -60,7 +60,7 @@ impl<'a> Patch<'a> {
         })
     }
 
-    /// Cells row by row, 1 for white, and how far they are from the middle on average, 0 to 0.5; `None`: the border has light cells.
+    /// A pattern as [`Family::codes`] has them, and how far they are from the middle on average, 0 to 0.5; `None`: the border has light cells.
     pub fn code(&self, family: &Family) -> Option<(u64, f32)> {
         let (n, border, side) = (family.cells, family.border, family.side_cells());
         if !self.has_dark_border(side, border) {
@@ -76,12 +76,14 @@ impl<'a> Patch<'a> {
         let cells = (0..n).flat_map(|y| (0..n).map(move |x| (x as f64 + 0.5, y as f64 + 0.5)));
         let mut values: Vec<f32> = cells.map(|(x, y)| cell(border + x, border + y)).collect();
         sharpen(&mut values, n, self.side_px / side);
+        let ring = family.ring().map(|(x, y)| cell(x, y));
         let (mut pattern, mut clarity) = (0, 0.0);
-        for value in values {
-            pattern = pattern << 1 | u64::from(value > DARKEST_WHITE);
+        for value in ring.chain(values) {
+            // What is ringed is read from the picture's negative.
+            pattern = pattern << 1 | u64::from((value > DARKEST_WHITE) != family.is_ringed);
             clarity += (value - DARKEST_WHITE).abs().min(0.5);
         }
-        Some((pattern, clarity / (n * n) as f32))
+        Some((pattern, clarity / family.code_cells() as f32))
     }
 
     /// Mean light of `n` x `n` cells, row by row, that fill the middle `share` of the sides.

@@ -20,6 +20,11 @@ impl Code {
         }
     }
 
+    /// Its markers' borders are white in a ring of black.
+    pub fn is_ringed(&self) -> bool {
+        matches!(self, Self::Family(family) if family.is_ringed)
+    }
+
     /// Markers that there are; their ids count from 0.
     pub fn count(&self) -> usize {
         match self {

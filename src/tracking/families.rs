@@ -11,6 +11,7 @@ pub static FAMILIES: LazyLock<Vec<Family>> = LazyLock::new(|| {
         name,
         cells,
         border: 1.0,
+        is_ringed: false,
         codes: text
             .lines()
             .filter_map(|line| u64::from_str_radix(line, 16).ok())
@@ -24,6 +25,15 @@ pub static FAMILIES: LazyLock<Vec<Family>> = LazyLock::new(|| {
             2,
             include_str!("families/apriltag_36h11.txt"),
         ),
+        Family {
+            is_ringed: true,
+            ..table(
+                "apriltag-standard-41h12",
+                3,
+                2,
+                include_str!("families/apriltag_standard_41h12.txt"),
+            )
+        },
         table("aruco-6x6", 6, 2, include_str!("families/aruco_6x6.txt")),
         table("aruco-5x5", 5, 1, include_str!("families/aruco_5x5.txt")),
         table(
@@ -80,6 +90,7 @@ fn square_binary(name: &'static str, cells: usize) -> Family {
         name,
         cells,
         border: 0.5 * n as f64,
+        is_ringed: false,
         codes: codes.collect(),
         corrected: 0,
     }
@@ -87,7 +98,6 @@ fn square_binary(name: &'static str, cells: usize) -> Family {
 
 #[cfg(test)]
 mod tests {
-    use super::super::family::{mirrored, turned_back};
     use super::*;
 
     #[test]
@@ -111,9 +121,9 @@ mod tests {
                         "{}",
                         family.name
                     );
-                    seen = turned_back(seen, family.cells);
+                    seen = family.turned_back(seen);
                 }
-                let mirror = family.find(mirrored(*code, family.cells));
+                let mirror = family.find(family.mirrored(*code));
                 mirrored_found += usize::from(mirror.is_some_and(|m| m.id == id));
             }
             assert!(mirrored_found * 4 <= family.codes.len(), "{}", family.name);
@@ -123,6 +133,7 @@ mod tests {
     fn expected(name: &str) -> usize {
         match name {
             "apriltag-36h11" => 587,
+            "apriltag-standard-41h12" => 2115,
             "apriltag-25h9" => 35,
             "apriltag-16h5" => 30,
             "aruco-original" => 1024,

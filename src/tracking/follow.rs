@@ -2,11 +2,11 @@
 
 use nalgebra::DMatrix;
 
-use super::Flatness;
 use super::bundle::Solution;
+use super::calibrate::Sighting;
 use super::code::Code;
-use super::detector::{Detector, FrameSeen, sighting};
-use super::frame_pose::Minima;
+use super::detector::{self, Detector, FrameSeen, sighting};
+use super::frame_pose::{self, Fit, Minima};
 use super::half_turn::keep_turn;
 use super::known_board::KnownBoard;
 use super::lens::{LENS_PARAMETERS, Lens};
@@ -14,8 +14,11 @@ use super::light::{Luma, Tone};
 use super::options::{Target, TrackOptions};
 use super::pose::Pose;
 use super::prepare::prepare;
+use super::rolling::{period_of, share_of};
+use super::row_ways::{Around, RowWays};
 use super::settle::settle;
 use super::tracker::{WORST_RMS_PX, minima_of, rms_px};
+use super::{Flatness, TrackError};
 
 /// Finds poses frame by frame.
 #[derive(Clone, Debug)]
@@ -26,7 +29,25 @@ pub struct Follower {
     detector: Option<Detector>,
     /// The last frame with a pose: it tells which of two poses is meant, and which end of a chessboard is first.
     before: Option<(FrameSeen, Minima)>,
+    rows: Option<RowTimes>,
+    /// Frames with a pose, the newest last, as far as they tell how the camera moves.
+    past: Vec<(u32, Pose)>,
 }
+
+/// A sensor's rows, in frames.
+#[derive(Clone, Copy, Debug)]
+struct RowTimes {
+    readout: f64,
+    /// Poses that are further back tell no motion.
+    reach: f64,
+}
+
+/// Seconds back to the last pose that still tells how the camera moves.
+const LONGEST_MOTION_SECS: f64 = 0.25;
+/// Poses before a frame's own whose way is taken to go on.
+const PAST: usize = 2;
+/// Times that a pose and the ways of the rows are found anew from one another.
+const ROUNDS: usize = 3;
 
 impl Follower {
     /// `code` where the board does not tell it; `tone` in place of the board's.
@@ -58,14 +79,35 @@ impl Follower {
             solution,
             detector,
             before: None,
+            rows: None,
+            past: Vec::new(),
         }
     }
 
-    /// Camera from world.
+    /// Rows are read one after the other, in so many seconds (below 0: from the lowest up); poses are then those of the middle row's time.
+    ///
+    /// # Errors
+    /// There is no rate of frames, or the readout is longer than a frame.
+    pub fn with_readout(
+        self,
+        readout_secs: f64,
+        frames_per_second: Option<f64>,
+    ) -> Result<Self, TrackError> {
+        let period = period_of(frames_per_second)?;
+        Ok(Self {
+            rows: Some(RowTimes {
+                readout: share_of(readout_secs, period)?,
+                reach: LONGEST_MOTION_SECS / period,
+            }),
+            ..self
+        })
+    }
+
+    /// Camera from world; numbers rise from frame to frame, those that are left out counted.
     ///
     /// # Errors
     /// Why the frame has no pose.
-    pub fn follow(&mut self, luma: &Luma) -> Result<Pose, String> {
+    pub fn follow(&mut self, luma: &Luma, number: u32) -> Result<Pose, String> {
         let mut seen = self.look(luma)?;
         if let (Some((columns, rows)), Some((before, _))) = (self.chessboard(), &self.before) {
             let mut both = [before.clone(), seen];
@@ -79,17 +121,63 @@ impl Follower {
             None => settle(&[Some(&minima)]),
         };
         let (fit, _) = settled.into_iter().next_back().ok_or("no pose")??;
+        let (fit, sighting) = self.at_the_middle_row(&seen, (fit, sighting), luma.height, number);
         let rms_px = rms_px(&fit, &sighting, &self.solution);
         if rms_px > WORST_RMS_PX {
             return Err(format!("the best pose leaves {rms_px:.1} px"));
         }
         let pose = fit.pose;
+        if self.rows.is_some() {
+            self.past.push((number, pose));
+        }
         let decided = Minima {
             best: fit,
             other: None,
         };
         self.before = Some((seen, decided));
         Ok(pose)
+    }
+
+    /// The pose in the middle of the frame's time, and what is seen then, from the pose of all rows alike. Only what has been tells how the camera moves: a
+    /// stream does not wait for the next frame.
+    fn at_the_middle_row(
+        &mut self,
+        seen: &FrameSeen,
+        (mut fit, mut sighting): (Fit, Sighting),
+        height: usize,
+        number: u32,
+    ) -> (Fit, Sighting) {
+        let Some(rows) = self.rows else {
+            return (fit, sighting);
+        };
+        let after = |past: u32| f64::from(past) - f64::from(number);
+        (self.past).retain(|(past, _)| (-rows.reach..0.0).contains(&after(*past)));
+        let old = self.past.len().saturating_sub(PAST);
+        self.past.drain(..old);
+        if self.past.is_empty() {
+            return (fit, sighting);
+        }
+        let ways = RowWays::of(&self.solution, &self.known.board, height);
+        for _ in 0..ROUNDS {
+            let past = self.past.iter().map(|(past, pose)| (after(*past), *pose));
+            let (nodes, poses) = past.chain([(0.0, fit.pose)]).unzip();
+            let still = ways.frame_still(seen, &Around { nodes, poses }, rows.readout);
+            let (found, _) =
+                detector::sighting(&still, &self.known.board, Some(&self.solution.lens));
+            let Solution { lens, points, .. } = &self.solution;
+            let refitted = frame_pose::fit(
+                lens,
+                points,
+                &found.observations,
+                &fit.pose,
+                self.solution.noise_px,
+            );
+            let Some(refitted) = refitted else {
+                break;
+            };
+            (fit, sighting) = (refitted, found);
+        }
+        (fit, sighting)
     }
 
     fn chessboard(&self) -> Option<(usize, usize)> {

@@ -53,6 +53,10 @@ pub fn robust(squared: f64) -> (f64, f64) {
     )
 }
 
+/// Of the inverse of an information with these weights, what is the covariance, where errors are normal along both axes: an estimate that weighs
+/// errors so varies by E[psi^2] / E[psi']^2 (Huber 1981), psi being the weighted error, and the inverse says 1 / E[weight].
+pub const COVARIANCE_SHARE: f64 = 0.836;
+
 /// Error in pixels and its slopes by the pose and by the point in the camera's frame; `None`: it is behind the camera.
 pub struct Projected {
     pub error: DVec2,
@@ -346,6 +350,26 @@ mod tests {
             rotation: turn(DVec3::new(2.1, 0.4, -0.3)),
             translation: DVec3::new(0.03, -0.02, 0.6),
         }
+    }
+
+    /// Over squared lengths of normal errors, which fall off exponentially. Control: without weights nothing is to be put right.
+    #[test]
+    fn covariances_are_those_of_weighted_errors() {
+        let share = |weight: &dyn Fn(f64) -> f64| {
+            let (mut weights, mut squares, mut slopes) = (0.0, 0.0, 0.0);
+            const STEP: f64 = 1e-3;
+            for k in 0..60_000 {
+                let squared = (f64::from(k) + 0.5) * STEP;
+                let density = 0.5 * (-0.5 * squared).exp() * STEP;
+                let by_squared = (weight(squared + 1e-5) - weight(squared - 1e-5)) / 2e-5;
+                weights += density * weight(squared);
+                squares += density * 0.5 * squared * weight(squared).powi(2);
+                slopes += density * (weight(squared) + squared * by_squared);
+            }
+            squares / (slopes * slopes) * weights
+        };
+        assert!((share(&|squared| robust(squared).1) - COVARIANCE_SHARE).abs() < 5e-4);
+        assert!((share(&|_| 1.0) - 1.0).abs() < 1e-3);
     }
 
     #[test]

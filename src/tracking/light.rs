@@ -100,6 +100,14 @@ impl LightImage {
         }
     }
 
+    /// Light for dark.
+    pub fn negative(&self) -> Self {
+        Self {
+            values: self.values.iter().map(|light| 1.0 - light).collect(),
+            ..*self
+        }
+    }
+
     /// Bilinear between pixel centres, the edge's value beyond. Pixels, corner origin.
     pub fn at(&self, place: DVec2) -> f32 {
         let x = (place.x - 0.5).clamp(0.0, self.width as f64 - 1.001);

@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::cells::Patch;
 use super::code::Code;
 use super::edge::{Sides, refine};
-use super::family::{Family, Match, mirrored};
+use super::family::{Family, Match};
 use super::frame_pose::Observation;
 use super::light::LightImage;
 use super::patterns::{Likeness, Patterns};
@@ -62,11 +62,22 @@ const FEW_BITS: f64 = 12.0;
 
 /// All markers of these codes, each id once.
 pub fn find_markers(image: &LightImage, codes: &[Code]) -> Seen {
+    let (ringed, dark): (Vec<Code>, Vec<Code>) = codes.iter().cloned().partition(Code::is_ringed);
+    let mut seen = Seen::default();
+    if !dark.is_empty() {
+        add_markers(&mut seen, image, &dark);
+    }
+    if !ringed.is_empty() {
+        add_markers(&mut seen, &image.negative(), &ringed);
+    }
+    without_doubles(&mut seen.markers);
+    seen
+}
+
+/// Those of dark quadrilaterals.
+fn add_markers(seen: &mut Seen, image: &LightImage, codes: &[Code]) {
     let quads = find_quads(image);
-    let mut seen = Seen {
-        quads: quads.len(),
-        ..Seen::default()
-    };
+    seen.quads += quads.len();
     for rough in quads {
         if Patch::of(image, &rough).is_none() {
             continue;
@@ -94,8 +105,6 @@ pub fn find_markers(image: &LightImage, codes: &[Code]) -> Seen {
             sides: sides.turned(found.turn),
         });
     }
-    without_doubles(&mut seen.markers);
-    seen
 }
 
 /// An id that is in two places is in neither, but for a smaller quadrilateral around the same place.
@@ -181,7 +190,7 @@ fn of_family(patch: &Patch, family: &'static Family) -> Found {
         None => {
             // Where every second pattern is a code a mirrored one says nothing.
             let says = family.bits(0, family.codes.len()) > LEAST_MIRROR_BITS;
-            match family.find(mirrored(pattern, family.cells)) {
+            match family.find(family.mirrored(pattern)) {
                 Some(_) if says => Found::InMirror,
                 _ => Found::Nothing,
             }

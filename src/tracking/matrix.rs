@@ -43,6 +43,7 @@ fn family(name: &'static str, cells: usize, words: Vec<u64>, corrected: u32) -> 
         name,
         cells,
         border: 0.5 * n as f64,
+        is_ringed: false,
         codes: codes.collect(),
         corrected,
     }

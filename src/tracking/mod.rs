@@ -43,6 +43,7 @@ mod print;
 mod quad;
 mod report;
 mod rolling;
+mod row_ways;
 mod saddle;
 mod session;
 mod settle;

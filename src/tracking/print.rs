@@ -81,6 +81,11 @@ impl Board {
     /// Black cells, `origin` being the sheet's upper left corner, metres; and where the last of them ends.
     fn markers(&self, origin: DVec2) -> Result<(Vec<[DVec2; 4]>, DVec2), TrackError> {
         let family = match &self.code {
+            Some(Code::Family(family)) if family.is_ringed => {
+                return Err(TrackError::input(
+                    "markers with cells around their border are not printed; expected another `family`; print the pictures that AprilTag's authors give (github.com/AprilRobotics/apriltag-imgs)",
+                ));
+            }
             Some(Code::Family(family)) => *family,
             Some(Code::Patterns(_)) => {
                 return Err(TrackError::input(

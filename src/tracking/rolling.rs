@@ -3,17 +3,14 @@
 //! A row is off by the way that the picture has gone between the row's own time and the middle, which the poses of neighbouring frames tell. Poses follow
 //! from corners and corners from poses, so all is solved again, a few times.
 
-use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::TrackError;
-use super::bundle::Solution;
 use super::detector::{FrameSeen, sighting};
-use super::frame_pose::{Observation, fit};
-use super::lens::Lens;
-use super::marker::{Marker, Seen};
+use super::frame_pose::fit;
 use super::options::{Readout, TrackOptions};
 use super::pose::Pose;
+use super::row_ways::{Around, RowWays};
 use super::solved::{Solved, solve};
 
 /// The readout time that poses were found with.
@@ -46,23 +43,11 @@ pub fn solve_rows(
     frames_per_second: Option<f64>,
     readout: Readout,
 ) -> Result<(Solved, Rows), TrackError> {
-    let Some(rate) = frames_per_second else {
-        return Err(TrackError::input(
-            "a readout time says nothing where the time between frames is unknown; expected a Y4M stream, which has a rate; convert the video with ffmpeg -i VIDEO -f yuv4mpegpipe, or leave out --readout-time",
-        ));
-    };
-    let period = 1.0 / rate;
+    let period = period_of(frames_per_second)?;
     let mut share = match readout {
-        Readout::Known(secs) => secs / period,
+        Readout::Known(secs) => share_of(secs, period)?,
         Readout::Solve => 0.0,
     };
-    if share.abs() > 1.0 {
-        return Err(TrackError::input(format!(
-            "rows are read in {:.1} ms, and a frame takes {:.1} ms; expected no more than that; see the sensor's data again",
-            1e3 * share.abs() * period,
-            1e3 * period
-        )));
-    }
     let mut solved = solve(options, seen, size)?;
     let mut sigma = None;
     for _ in 0..ROUNDS {
@@ -91,6 +76,34 @@ pub fn solve_rows(
     Ok((solved, rows))
 }
 
+/// Seconds from one frame to the next.
+///
+/// # Errors
+/// There is no rate of frames.
+pub fn period_of(frames_per_second: Option<f64>) -> Result<f64, TrackError> {
+    frames_per_second.map(f64::recip).ok_or_else(|| {
+        TrackError::input(
+            "a readout time says nothing where the time between frames is unknown; expected a Y4M stream, which has a rate; convert the video with ffmpeg -i VIDEO -f yuv4mpegpipe, or leave out --readout-time",
+        )
+    })
+}
+
+/// Of the time between two frames, what rows are read in.
+///
+/// # Errors
+/// It is more than that.
+pub fn share_of(readout_secs: f64, period_secs: f64) -> Result<f64, TrackError> {
+    let share = readout_secs / period_secs;
+    if share.abs() <= 1.0 {
+        return Ok(share);
+    }
+    Err(TrackError::input(format!(
+        "rows are read in {:.1} ms, and a frame takes {:.1} ms; expected no more than that; see the sensor's data again",
+        1e3 * readout_secs.abs(),
+        1e3 * period_secs
+    )))
+}
+
 fn undetermined(found: Option<(f64, f64)>, period: f64) -> TrackError {
     let how_well = match found {
         Some((share, sigma)) => format!(
@@ -110,8 +123,7 @@ fn undetermined(found: Option<(f64, f64)>, period: f64) -> TrackError {
 struct Motion<'a> {
     solved: &'a Solved,
     poses: Vec<Option<Pose>>,
-    /// Its number, from 0.
-    last_row: f64,
+    rows: RowWays<'a>,
 }
 
 /// Frames, by how many they come after one, that tell how things move in it: the first of these sets that all have a pose.
@@ -124,53 +136,6 @@ const NODES: [&[isize]; 6] = [
     &[-1, 0],
 ];
 
-/// Poses around a frame's own.
-struct Around {
-    nodes: &'static [isize],
-    poses: Vec<Pose>,
-}
-
-impl Around {
-    /// Frames before and after it tell its motion.
-    fn is_between(&self) -> bool {
-        self.nodes.first() < Some(&0) && self.nodes.last() > Some(&0)
-    }
-
-    /// `None`: one of the poses has the point behind it.
-    fn path(&self, lens: &Lens, point: DVec3) -> Option<Path> {
-        let places = self.poses.iter().map(|pose| {
-            let seen = pose.of(point);
-            let ideal = DVec2::new(seen.x, seen.y) / seen.z;
-            (seen.z > 1e-6).then(|| lens.pixel_of(ideal))
-        });
-        Some(Path {
-            nodes: self.nodes,
-            places: places.collect::<Option<_>>()?,
-        })
-    }
-}
-
-/// Where a point of the board is in the pictures around a frame.
-struct Path {
-    nodes: &'static [isize],
-    places: Vec<DVec2>,
-}
-
-impl Path {
-    /// Pixels from where it is in the frame to where it is so many frames later, on the polynomial through all places (Lagrange).
-    fn way(&self, frames: f64) -> DVec2 {
-        let each = self.nodes.iter().zip(&self.places).map(|(node, place)| {
-            let others = self.nodes.iter().filter(|other| *other != node);
-            let weight: f64 = others
-                .map(|other| (frames - *other as f64) / (node - other) as f64)
-                .product();
-            let own = if *node == 0 { 1.0 } else { 0.0 };
-            *place * (weight - own)
-        });
-        each.sum()
-    }
-}
-
 impl<'a> Motion<'a> {
     fn of(solved: &'a Solved, height: usize) -> Self {
         let poses = solved.frames.iter();
@@ -179,7 +144,7 @@ impl<'a> Motion<'a> {
             poses: poses
                 .map(|frame| frame.pose.as_ref().ok().map(|pose| pose.fit.pose))
                 .collect(),
-            last_row: (height as f64 - 1.0).max(1.0),
+            rows: RowWays::of(&solved.solution, &solved.board, height),
         }
     }
 
@@ -194,76 +159,20 @@ impl<'a> Motion<'a> {
         NODES.into_iter().find_map(|nodes| {
             let poses = nodes.iter().map(|after| self.pose(frame, *after));
             Some(Around {
-                nodes,
+                nodes: nodes.iter().map(|after| *after as f64).collect(),
                 poses: poses.collect::<Option<_>>()?,
             })
         })
-    }
-
-    /// From the frame's middle to the time of a row, in frames, where readout takes that share of one.
-    fn time_of(&self, place: DVec2, share: f64) -> f64 {
-        share * ((place.y - 0.5) / self.last_row - 0.5)
     }
 
     fn all_still(&self, seen: &[FrameSeen], share: f64) -> Vec<FrameSeen> {
         let frames = seen.par_iter().enumerate();
         frames
             .map(|(frame, seen)| match self.around(frame) {
-                Some(around) => self.frame_still(seen, &around, share),
+                Some(around) => self.rows.frame_still(seen, &around, share),
                 None => seen.clone(),
             })
             .collect()
-    }
-
-    /// All that is seen, where it was in the middle of the frame's time.
-    fn frame_still(&self, seen: &FrameSeen, around: &Around, share: f64) -> FrameSeen {
-        let Solution { lens, points, .. } = &self.solved.solution;
-        let observed = |all: &[Observation]| -> Vec<Observation> {
-            let each = all.iter().map(|o| {
-                let path = around.path(lens, points[o.point]);
-                let way = path.map(|path| path.way(self.time_of(o.pixel, share)));
-                Observation {
-                    pixel: o.pixel - way.unwrap_or_default(),
-                    ..*o
-                }
-            });
-            each.collect()
-        };
-        match seen {
-            FrameSeen::Lost(why) => FrameSeen::Lost(why.clone()),
-            FrameSeen::Corners(corners) => FrameSeen::Corners(observed(corners)),
-            FrameSeen::Markers(seen) => FrameSeen::Markers(Seen {
-                markers: (seen.markers.iter())
-                    .map(|marker| self.marker_still(marker, around, share))
-                    .collect(),
-                between: observed(&seen.between),
-                ..seen.clone()
-            }),
-        }
-    }
-
-    /// Along a side the way goes evenly from one corner's to the next.
-    fn marker_still(&self, marker: &Marker, around: &Around, share: f64) -> Marker {
-        let Solution { lens, points, .. } = &self.solved.solution;
-        let Some(first) = self.solved.board.markers.get(&marker.id) else {
-            return marker.clone();
-        };
-        let paths = (0..4).map(|k| around.path(lens, points[first + k]));
-        let Some(paths) = paths.collect::<Option<Vec<Path>>>() else {
-            return marker.clone();
-        };
-        let moved = |side: usize, place: DVec2| {
-            let next = (side + 1) % 4;
-            let (from, to) = (marker.corners[side], marker.corners[next]);
-            let along = (place - from).dot(to - from) / from.distance_squared(to);
-            let frames = self.time_of(place, share);
-            place - paths[side].way(frames).lerp(paths[next].way(frames), along)
-        };
-        Marker {
-            corners: std::array::from_fn(|k| moved(k, marker.corners[k])),
-            sides: marker.sides.moved(moved),
-            ..marker.clone()
-        }
     }
 
     /// Cost with that readout of all frames that lie between others, lens and board being as they are: squared standard deviations.
@@ -274,7 +183,7 @@ impl<'a> Motion<'a> {
         let each = seen.par_iter().enumerate().filter_map(|(frame, seen)| {
             let around = self.around(frame).filter(Around::is_between)?;
             let start = self.pose(frame, 0)?;
-            let still = self.frame_still(seen, &around, share);
+            let still = self.rows.frame_still(seen, &around, share);
             let (sighting, _) = sighting(&still, board, Some(&solution.lens));
             let observations = &sighting.observations;
             let found = fit(

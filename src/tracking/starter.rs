@@ -51,6 +51,16 @@ impl Session {
                 .collect();
             line(format_args!("world_from_camera = [{}]\n", rows.join(", ")));
         }
+        match self.rows.map(|rows| rows.readout_secs) {
+            None => {}
+            Some(secs) if secs >= 0.0 => line(format_args!(
+                "\n[shutter]                               # rows as they were read, one after the other\nexposure_secs = 0.0                     # how long each is open: what moves is blurred by it\nreadout_secs = {secs:.6}\n"
+            )),
+            Some(secs) => line(format_args!(
+                "\n# Rows were read from the lowest up, in {:.1} ms; [shutter] reads them from the first down.\n",
+                -1e3 * secs
+            )),
+        }
         line(format_args!(
             "\n[environment]                           # the light of the place: replace it by a light probe\nradiance = [0.3, 0.3, 0.3]\n\n[[light]]\nkind = \"quad\"\ncorner = [{:.3}, {:.3}, {:.3}]\nedge_u = [{extent:.3}, 0.0, 0.0]\nedge_v = [0.0, 0.0, {extent:.3}]                # u x v points down\nradiance = [3.0, 3.0, 3.0]\n",
             middle.x - extent,

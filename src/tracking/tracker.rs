@@ -10,7 +10,7 @@ use super::bundle::{Solution, View};
 use super::calibrate::Sighting;
 use super::choice::Choice;
 use super::detector::{FrameSeen, sighting};
-use super::frame_pose::{Fit, Minima, find_pose, project};
+use super::frame_pose::{COVARIANCE_SHARE, Fit, Minima, find_pose, project};
 use super::light::Tone;
 use super::settle::settle;
 
@@ -116,7 +116,8 @@ fn finished(
         return Err(format!("the best pose leaves {rms_px:.1} px"));
     }
     let singular = || "what is seen determines no pose".to_owned();
-    let own_covariance = fit.information.try_inverse().ok_or_else(singular)?;
+    let inverse = fit.information.try_inverse().ok_or_else(singular)?;
+    let own_covariance = COVARIANCE_SHARE * inverse;
     let view = View {
         pose: fit.pose,
         observations: sighting.observations.clone(),

@@ -158,6 +158,53 @@ fn the_newest_frame_wins_and_the_others_are_counted_in_order() {
     assert_eq!(view(out[out.len() - 1]), Some(4), "the last frame goes out");
 }
 
+/// Pixels of a frame whose brightness differs from another's, row-major.
+fn differs(a: &[u8], b: &[u8]) -> Vec<bool> {
+    let luma = b"FRAME\n".len()..b"FRAME\n".len() + 480 * 360;
+    let pairs = a[luma.clone()].iter().zip(&b[luma]);
+    pairs.map(|(a, b)| a != b).collect()
+}
+
+/// Where there is no time, pictures are coarser: what they change lies where the whole picture changes the frame or next to it, and all else is the
+/// stream's to the bit. Control: the whole picture is another one.
+#[test]
+fn pictures_that_do_not_fit_into_their_time_are_coarser_and_change_nothing_else() {
+    let (folder, stream) = prepared();
+    let (_, frames) = parts(&stream);
+    let run = |flags: &str| {
+        let line = format!("{LIVE} --hold 0 {flags} --stats stats.json");
+        let out = in_step(&folder, &line, &stream);
+        let total = folder.json("stats.json")["total"].clone();
+        let number = |name: &str| total[name].as_f64().unwrap();
+        (out, number("coarseness"), number("rays_per_pixel"))
+    };
+    let (whole, coarseness, rays) = run("--fps 10000 --coarsest 1");
+    assert_eq!((coarseness, rays), (1.0, 1.0));
+    let (coarse, coarseness, rays) = run("--fps 10000");
+    // What two frames take is not known beforehand.
+    assert!(coarseness > 2.0 && rays < 0.6, "{coarseness} {rays}");
+    let last = frames.len() - 1;
+    let (fine, rough) = (
+        differs(frames[last], &whole[last]),
+        differs(frames[last], &coarse[last]),
+    );
+    let is_near = |pixel: usize| {
+        let (x, y) = (pixel % 480, pixel / 480);
+        (y.saturating_sub(12)..(y + 13).min(360))
+            .any(|y| (x.saturating_sub(12)..(x + 13).min(480)).any(|x| fine[480 * y + x]))
+    };
+    let count = |changed: &[bool]| changed.iter().filter(|changed| **changed).count();
+    assert!((0..480 * 360).all(|pixel| !rough[pixel] || is_near(pixel)));
+    let share = count(&rough) as f64 / count(&fine) as f64;
+    assert!((0.9..2.0).contains(&share), "{share}");
+    let between = count(&differs(&whole[last], &coarse[last]));
+    assert!(between > 100, "control: {between}");
+    assert_eq!(
+        coarse[3], frames[3],
+        "without a pose a frame passes through"
+    );
+}
+
 #[test]
 fn streams_that_break_off_change_or_are_noise_end_with_an_error() {
     let (folder, stream) = prepared();
@@ -194,6 +241,16 @@ fn streams_that_break_off_change_or_are_noise_end_with_an_error() {
         "live scene.toml --board absent.toml --input in.y4m",
         "cannot be read",
     );
+    for (time, part) in [
+        ("50ms", "a frame takes 40.0 ms"),
+        ("solve", "mixray track --readout-time solve"),
+    ] {
+        folder.write("in.y4m", &stream);
+        let line = format!("{LIVE} --input in.y4m --readout-time {time}");
+        let output = folder.run(&line);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(stderr(&output).contains(part), "{}", stderr(&output));
+    }
 }
 
 #[test]
@@ -255,7 +312,8 @@ fn blur_is_of_ways_between_both_thresholds_and_not_of_a_covered_marker() {
             )
         });
         folder.write("scene.toml", format!("{SCENE}{blur}"));
-        let line = "live scene.toml --board board.toml --gamma 2.2 --backend cpu --rpp 1 --hold 100 --stats stats.json";
+        // Runs that are compared are of one size, whatever time they have.
+        let line = "live scene.toml --board board.toml --gamma 2.2 --backend cpu --rpp 1 --coarsest 1 --hold 100 --stats stats.json";
         in_step(&folder, line, &stream)
     };
     let sharp = run(None);

@@ -109,6 +109,7 @@ fn an_object_stays_where_the_poses_put_it() {
             time_secs: 0.0,
             seed: number,
             anchor: None,
+            coarseness: 1,
         };
         renderer.set_frame(edit, &Watcher::none()).expect("fits");
         renderer
@@ -287,4 +288,28 @@ fn memory_stays_flat() {
     };
     eprintln!("peak memory: {few:.1} MiB after 10 frames, {many:.1} MiB after 150");
     assert!(many < few + 4.0, "{few} MiB, {many} MiB");
+}
+
+/// The trajectory alone brings the lens. Control: a frame without a pose is an error unless such frames may pass.
+#[test]
+fn the_first_frame_may_be_one_that_has_no_pose() {
+    let folder = Folder::new();
+    folder.write("scene.toml", BALL.replace("fx = 40", ""));
+    folder.frames(3, 0.1);
+    let frames: Vec<String> = (1..3)
+        .map(|number| {
+            format!(
+                r#"{{"file_path": "f_{number:04}.png", "fl_x": 40, "fl_y": 40, "cx": 24, "cy": 18, "w": 48, "h": 36, "camera_model": "PINHOLE", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}}"#
+            )
+        })
+        .collect();
+    folder.write(
+        "poses.json",
+        format!("{{\"frames\": [{}]}}", frames.join(", ")),
+    );
+    folder.refuse_sequence(&["--frames", "in", "-o", "out"], "it has no pose for");
+    folder.sequence(&["--frames", "in", "--missing-poses", "pass", "-o", "out"]);
+    let (before, after) = (folder.frames_of("in"), folder.frames_of("out"));
+    let same: Vec<bool> = before.iter().zip(&after).map(|(a, b)| a.1 == b.1).collect();
+    assert_eq!(same, [true, false, false]);
 }

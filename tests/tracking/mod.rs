@@ -5,6 +5,7 @@ mod commands;
 pub mod film;
 mod patterns;
 mod photographs;
+mod ringed;
 mod rolling;
 mod scale;
 mod videos;

@@ -1,6 +1,6 @@
 //! `mixray track` on films whose rows were read one after the other, the camera known at every row's own time.
 
-use mixray::tracking::Family;
+use mixray::tracking::{Family, Follower, Luma, Tone, read_known_board};
 
 use super::commands::{LENS_OF_THE_FILM, off, pose};
 use super::film::{Film, View, looking, markers};
@@ -110,4 +110,57 @@ fn the_readout_time_is_solved_for_where_motion_shows_it() {
     let output = still.run(&format!("{TRACK} --readout-time 20"));
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("a time with its unit"));
+}
+
+/// A stream's poses follow from those before; every frame, and every other one as where frames are dropped. Control: without a readout time.
+#[test]
+fn a_stream_s_poses_are_those_of_the_middle_row_as_far_as_the_past_tells() {
+    let folder = film(1.0, SHARE);
+    let known = read_known_board(&folder.path("board.toml")).unwrap();
+    let bytes = folder.bytes("film.y4m");
+    let (_, frames) = crate::live::parts(&bytes);
+    let errors = |readout_secs: Option<f64>, step: usize| {
+        let lens = Film::around().lens;
+        let follower = Follower::new(known.clone(), None, lens, Some(Tone::Power(2.2)));
+        let mut follower = match readout_secs {
+            Some(secs) => follower.with_readout(secs, Some(25.0)).unwrap(),
+            None => follower,
+        };
+        let (mut mm, mut degrees, mut count) = (0.0, 0.0, 0.0);
+        for (number, frame) in frames.iter().enumerate().step_by(step) {
+            let luma = Luma {
+                width: 480,
+                height: 360,
+                codes: frame[b"FRAME\n".len()..][..480 * 360].to_vec(),
+            };
+            let pose = follower.follow(&luma, number as u32).unwrap();
+            // The first ones have no past.
+            if number >= 2 * step {
+                let own = off(&pose.world_from_camera(), &at(number as f64));
+                (mm, degrees, count) = (mm + own.0 * own.0, degrees + own.1 * own.1, count + 1.0);
+            }
+        }
+        ((mm / count).sqrt(), (degrees / count).sqrt())
+    };
+    for (step, most) in [(1, [1.0, 0.1]), (2, [3.0, 0.3])] {
+        let (mm, degrees) = errors(Some(0.02), step);
+        let without = errors(None, step);
+        assert!(mm < most[0] && degrees < most[1], "{step}: {mm} {degrees}");
+        assert!(without.0 > 3.0 * mm, "{step}: {without:?} {mm}");
+    }
+}
+
+/// What was found goes into the scene to begin with. Control: a run in which all rows are of one time.
+#[test]
+fn the_readout_time_stands_in_the_scene_to_begin_with() {
+    let folder = film(1.0, SHARE);
+    let scene = |flag: &str| {
+        folder.succeed(&format!("{TRACK} {flag} --scene scene.toml"));
+        folder.succeed("info scene.toml");
+        folder.read("scene.toml")
+    };
+    let found = scene("--readout-time 20ms");
+    assert!(found.contains("[shutter]") && found.contains("readout_secs = 0.020000"));
+    assert!(!scene("").contains("[shutter]"));
+    assert!(scene("--readout-time -1ms").contains("from the lowest up"));
 }

@@ -7,7 +7,7 @@ use crate::preview::composition::{Composition, Difference};
 use crate::renderer::{
     Filter, FrameEdit, RenderError, Renderer, RendererOptions, Skip, Watcher, Without,
 };
-use crate::scene::{BackendChoice, EncodedPhoto, Exposure, Photo, Scene};
+use crate::scene::{BackendChoice, Exposure, Scene};
 
 /// The coarse picture's sides are the whole one's divided by this.
 const COARSE_DIVISOR: u32 = 4;
@@ -133,55 +133,19 @@ fn set_camera(
         time_secs: scene.shutter.map_or(0.0, |shutter| shutter.time_secs),
         seed: to.seed,
         anchor: Some(pose.w_axis.truncate()),
+        coarseness: 1,
     };
     renderer.set_frame(edit, watcher)
 }
 
 /// A quarter of the width and height, the photograph averaged.
 fn shrink(scene: &mut Scene) {
-    let camera = &mut scene.camera;
-    let [width, height] = [camera.width, camera.height].map(|side| side.div_ceil(COARSE_DIVISOR));
-    let [x, y] = [(width, camera.width), (height, camera.height)]
-        .map(|(small, whole)| f64::from(small) / f64::from(whole));
-    (camera.fx, camera.cx) = (camera.fx * x, camera.cx * x);
-    (camera.fy, camera.cy) = (camera.fy * y, camera.cy * y);
-    (camera.width, camera.height) = (width, height);
-    scene.photo = scene
-        .photo
-        .as_ref()
-        .map(|photo| shrunk(photo, width, height));
+    scene.camera = scene.camera.coarser(COARSE_DIVISOR);
+    let (width, height) = (scene.camera.width, scene.camera.height);
+    let photo = scene.photo.as_ref();
+    scene.photo = photo.map(|photo| photo.averaged(width, height));
     scene.settings.rays_per_pixel = COARSE_RAYS;
     scene.settings.clamp_indirect = scene.settings.clamp_indirect.min(COARSE_CLAMP);
     // It is small, and a second device would have to be opened for it.
     scene.settings.backend = BackendChoice::Cpu;
-}
-
-fn shrunk(photo: &Photo, width: u32, height: u32) -> Photo {
-    let range = |i: u32, small: u32, whole: u32| {
-        let begin = u64::from(i) * u64::from(whole) / u64::from(small);
-        let end = u64::from(i + 1) * u64::from(whole) / u64::from(small);
-        begin as usize..(end as usize).max(begin as usize + 1)
-    };
-    let mut linear = Vec::with_capacity(width as usize * height as usize);
-    for y in 0..height {
-        for x in 0..width {
-            let mut sum = glam::Vec3::ZERO;
-            let mut count = 0.0;
-            for row in range(y, height, photo.height) {
-                let begin = row * photo.width as usize;
-                for column in range(x, width, photo.width) {
-                    sum += glam::Vec3::from(photo.linear[begin + column]);
-                    count += 1.0;
-                }
-            }
-            linear.push((sum / count).to_array());
-        }
-    }
-    Photo {
-        width,
-        height,
-        linear,
-        encoded: EncodedPhoto::Linear,
-        tags: photo.tags.clone(),
-    }
 }

@@ -193,7 +193,10 @@ impl<'a> Views<'a> {
             None if self.passes_missing => Ok(FrameView {
                 time_secs: None,
                 world_from_camera: None,
-                intrinsics: None,
+                // The first frame of a sequence may be one, and the scene wants its lens.
+                intrinsics: (self.trajectory.entries.iter())
+                    .find_map(|entry| entry.intrinsics)
+                    .or(self.trajectory.intrinsics),
                 focus_distance_m: None,
             }),
             None => Err(self.absent(frame, "")),
