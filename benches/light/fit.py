@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """`mixray light fit` on photographs that mixray renders under a known light, and on two that a depth camera took.
 
-    pip install numpy pillow
+    pip install numpy pillow OpenEXR
     cargo build --release
     python3 benches/light/fit.py [--mixray target/release/mixray] [--data ../shared/data] [--write]
 
@@ -20,6 +20,7 @@ import subprocess
 import tempfile
 
 import numpy as np
+import OpenEXR
 from PIL import Image
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -70,7 +71,7 @@ def things(side, known, has_ball):
     for x, z, across, height, turn in [(-0.6, -0.3, 0.35, 0.5, 20), (0.5, 0.2, 0.3, 0.25, -35), (0.1, -0.9, 0.5, 0.8, 10), (-0.2, 0.7, 0.2, 0.15, 50)]:
         add(f'shape = "box"\nsize = [{across}, {height}, {across}]\ntranslation = [{x}, {height / 2 + 0.001}, {z}]\nrotation_deg = [0, {turn}, 0]')
     if has_ball:
-        add('shape = "sphere"\nradius = 0.22\ntranslation = [0.85, 0.221, -0.35]')
+        add('shape = "sphere"\nscale = 0.22\ntranslation = [0.85, 0.221, -0.35]')
     return "\n".join(parts)
 
 
@@ -197,25 +198,30 @@ def of_photographs(mixray, data, environments):
 
 
 def ball_on_desk(mixray, data, environments, scale):
-    """The desk, and with a ball on it at the studio's scale of 0.4 and at the one that was fitted; what keeps of the desk's light in the darkest quarter of its shadow."""
+    """The desk, and with a ball on it at the studio's scale of 0.4 and at the one that was fitted; what the darkest quarter of what it shades keeps, and
+    how much of the proxy's albedo lies at its limit."""
     box = (40, 220, 320, 420)
     desk = Image.open(data / "tum_desk_rgbd" / "photo.png").convert("RGB")
-    panels, kept = [desk.crop(box)], []
+    panels, kept, limited = [desk.crop(box)], [], []
     for strength in (0.4, scale):
         light = map_light(environments / "brown_photostudio_02_1k.hdr", 0.0, strength)
         ball = '[[virtual]]\nshape = "sphere"\nsize_m = 0.12\nrest_on = "real"\npixel = [185, 345]\nmaterial = { base_color = [0.5, 0.5, 0.5], specular = 0.0 }\n'
         (mixray.folder / "ball.toml").write_text(taken(data, "tum_desk_rgbd") + light + ball)
-        mixray("-q", "render", "ball.toml", "--rpp", "64", "-o", "ball.png", "-o", "ball.exr", "--layers", "composite,virtual")
+        said = mixray("render", "ball.toml", "--rpp", "64", "-o", "ball.png", "-o", "ball.exr", "--layers", "composite,virtual")
+        at_limit = re.search(r"(\d+)% of the proxy's albedo", said)
+        limited.append(f"{at_limit[1]}%" if at_limit else "less than half")
         panels.append(Image.open(mixray.folder / "ball.png").convert("RGB").crop(box))
         codes = [np.asarray(picture, float) / 255 for picture in (desk, Image.open(mixray.folder / "ball.png").convert("RGB"))]
         before, after = (np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722] for code in codes)
-        ratio = (after / np.maximum(before, 1e-3))[300:420, 60:300]
-        shaded = np.sort(ratio[(ratio > 0.3) & (ratio < 0.98)])
+        with OpenEXR.File(str(mixray.folder / "ball.exr")) as file:
+            covered = file.channels()["virtual"].pixels[..., 3]
+        ratio = (after / np.maximum(before, 1e-3))[covered == 0]
+        shaded = np.sort(ratio[ratio < 0.97])
         kept.append(float(shaded[: max(1, len(shaded) // 4)].mean()))
     strip = Image.new("RGB", (sum(panel.width for panel in panels), panels[0].height))
     for place, panel in enumerate(panels):
         strip.paste(panel, (place * panel.width, 0))
-    return strip.resize((strip.width * 3 // 2, strip.height * 3 // 2), Image.Resampling.LANCZOS), kept
+    return strip.resize((strip.width * 3 // 2, strip.height * 3 // 2), Image.Resampling.LANCZOS), kept, limited
 
 
 def table(head, rows):
@@ -239,15 +245,20 @@ def main():
         print(table(["", "photograph", "white sky", "studio as given", "studio, best fit", "explained by a white sky", "scale found", "fit"], photographs))
         renders = of_renders(mixray, environments)
         print(table(["truth", "albedo", "found"], renders))
-        strip, kept = ball_on_desk(mixray, data, environments, float(photographs[0][6]))
-        print(f"kept in the ball's shadow: {kept[0]:.2f} at 0.4, {kept[1]:.2f} at {photographs[0][6]}")
+        fitted = photographs[0][6]
+        strip, kept, limited = ball_on_desk(mixray, data, environments, float(fitted))
+        ball = (
+            f"At 0.4 {limited[0]} of the proxy's albedo lies at its limit, at {fitted} {limited[1]}. Of what the ball shades the darkest quarter keeps "
+            f"{kept[0]:.2f} of the photograph at 0.4, and {kept[1]:.2f} at {fitted}.\n"
+        )
+        print(ball)
         if not arguments.write:
             return
         tables = {
             "renders": table(["truth", "albedo", "found"], renders),
             "strong": table(["room's scale", "albedo", "direction off, degrees", "sun over room", "stated deviation"], strong),
             "photographs": table(["", "photograph", "white sky", "studio as given", "studio, best fit", "explained by a white sky", "scale found", "fit"], photographs),
-            "ball": f"Of what the ball shades on the desk the darkest quarter keeps {kept[0]:.2f} of the photograph at 0.4, and {kept[1]:.2f} at {photographs[0][6]}.\n",
+            "ball": ball,
         }
         page = PAGE.read_text()
         for name, text in tables.items():
