@@ -8,7 +8,7 @@ use super::fitter::{Candidate, Fitter, STRIDE, Strengths, Sun};
 use super::points::Grid;
 use super::rays::{Openness, sunlight};
 use super::residual::median_around;
-use super::verdict::{Gain, LEAST_SIGNIFICANCE, LEAST_SIGNIFICANCE_OF_KNOWN};
+use super::verdict::{Gain, LEAST_SIGNIFICANCE, LEAST_SIGNIFICANCE_OF_KNOWN_ROTATION};
 use super::{Explained, FitOptions, Fitted, FittedSun, LightFit, ScaleBasis, Shadows};
 use crate::math::luminance;
 use crate::packed::{MATERIAL_PHOTO_ALBEDO, NONE, PHOTO_PATCHES, PackedScene};
@@ -182,8 +182,7 @@ impl Search<'_> {
         suns.clear();
         suns.extend(self.fitter.suns(rotation_deg));
         meter.add(1);
-        let needed = self.least_significance();
-        let gain_of_sun = Gain::of(&suns, &alone, &flat, needed);
+        let gain_of_sun = Gain::of(&suns, &alone, &flat, LEAST_SIGNIFICANCE);
         let mut sun = gain_of_sun.is_real().then(|| least(&suns).sun).flatten();
         let mut gain_of_rotation = None;
         if turns {
@@ -194,6 +193,7 @@ impl Search<'_> {
             let kept = [self
                 .fitter
                 .candidate(given_deg, sun.map(|sun| sun.direction))];
+            let needed = self.least_significance_of_rotation();
             let gain = Gain::of(&turned, &kept, &flat, needed);
             gain_of_rotation = Some(gain);
             if gain.is_real() {
@@ -215,7 +215,7 @@ impl Search<'_> {
         };
         let gain = Gain::over_flat(&candidates, &flat);
         let white = [self.fitter.of_light(&self.white_sky)];
-        let gain_of_white_sky = Gain::of(&white, &candidates, &flat, needed);
+        let gain_of_white_sky = Gain::of(&white, &candidates, &flat, LEAST_SIGNIFICANCE);
         let strengths = self.strengths(rotation_deg, sun);
         let sun = sun.map(|sun| Sun {
             ratio: strengths.ratio,
@@ -361,9 +361,9 @@ impl Search<'_> {
         (self.fitter).off_by_pairs(&surroundings, &sunlight, sun.ratio)
     }
 
-    fn least_significance(&self) -> f64 {
+    fn least_significance_of_rotation(&self) -> f64 {
         match self.fitter.comparisons.are_absolute {
-            true => LEAST_SIGNIFICANCE_OF_KNOWN,
+            true => LEAST_SIGNIFICANCE_OF_KNOWN_ROTATION,
             false => LEAST_SIGNIFICANCE,
         }
     }
