@@ -96,6 +96,16 @@ pub fn exposure(scene: &Scene, fitted_ev: Option<f64>) -> Option<Finding> {
     Some(Finding::new(Check::Exposure, finding))
 }
 
+/// The same, where a render says it by itself: `limited` is the share of the proxy that no albedo makes as bright as the photograph.
+pub fn limited_albedo(scene: &Scene, limited: Option<f64>) -> Option<Finding> {
+    let share = limited.filter(|_| !scene.allowed.contains(&Check::Exposure))?;
+    let finding = format!(
+        "{:.0}% of the proxy's albedo lies at its limit: the light does not fit the photograph, and shadows will be wrong; set exposure_ev = \"auto\", or composite = \"quotient\"",
+        100.0 * share
+    );
+    Some(Finding::new(Check::Exposure, finding))
+}
+
 /// That the camera does not see as the one that took the photograph did; `noted_px` is what that one notes of its focal length.
 pub fn focal_length(scene: &Scene, noted_px: Option<f64>) -> Option<Finding> {
     let camera = &scene.camera;

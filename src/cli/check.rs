@@ -7,7 +7,7 @@ use clap::Args;
 use super::scene_flags::SceneFlags;
 use super::{Failure, Outcome, print, say};
 use crate::check::{self, Extent};
-use crate::renderer::roughly_fitted_exposure_ev;
+use crate::renderer::{roughly_fitted_exposure_ev, roughly_limited_albedo};
 use crate::scene::Scene;
 
 /// Reads a scene and tells what in it can hardly be meant, a line each, and how to mend it
@@ -28,7 +28,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     let mut findings = check::scene(&scene, Extent::Still);
     findings.extend(check::focal_length(&scene, noted_focal_px(&scene)));
-    findings.extend(check::exposure(&scene, roughly_fitted_exposure_ev(&scene)?));
+    let exposure = check::exposure(&scene, roughly_fitted_exposure_ev(&scene)?);
+    findings.extend(match exposure {
+        None => check::limited_albedo(&scene, roughly_limited_albedo(&scene)?),
+        told => told,
+    });
     let text: String = (findings.iter())
         .map(|finding| format!("{finding}\n"))
         .collect();

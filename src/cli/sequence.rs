@@ -49,6 +49,9 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     arguments.flags.start_threads()?;
+    if let Some(path) = &arguments.flags.stats {
+        check_writable_as(path, "json")?;
+    }
     match &arguments.check {
         Some(points) => check(arguments, points.as_deref()),
         None => render(arguments),
@@ -69,8 +72,12 @@ impl Arguments {
 
 fn check(arguments: &Arguments, points: Option<&Path>) -> Result<Outcome, Failure> {
     let reprojection = check_poses(&arguments.options()?, points, &tell)?;
-    print(&reprojection.text)?;
-    Ok(match reprojection.worst_px <= arguments.max_error {
+    if let Some(path) = &arguments.flags.stats {
+        write_text(path, &serde_json::to_string_pretty(&reprojection)?)?;
+    }
+    print(&reprojection.text())?;
+    let worst_px = reprojection.largest_px.unwrap_or(0.0);
+    Ok(match worst_px <= arguments.max_error {
         true => Outcome::Done,
         false => Outcome::CheckFailed,
     })
@@ -78,9 +85,6 @@ fn check(arguments: &Arguments, points: Option<&Path>) -> Result<Outcome, Failur
 
 fn render(arguments: &Arguments) -> Result<Outcome, Failure> {
     let options = arguments.options()?;
-    if let Some(path) = &arguments.flags.stats {
-        check_writable_as(path, "json")?;
-    }
     let interrupted = interrupt::watch()?;
     let cancelled = || interrupted.is_set();
     let to_engine = arguments.flags.progress;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
 
-use super::jpeg::{MAX_SCANS, outline, with_standard_tables};
+use super::jpeg::{MAX_SCANS, jpegs_of_film, outline, with_standard_tables};
 use super::png::{ColourChunks, colour_chunks};
 use super::profile::{ColourProfile, Unused};
 use super::{ALPHA, ImageFile, Pixels, Rgba8, Tags, broken, check_size, ensure_memory};
@@ -20,23 +20,19 @@ const COEFFICIENT_BYTES: u64 = 8;
 const GREY: u8 = 128;
 
 pub(super) fn read_png(bytes: &[u8]) -> Result<ImageFile, String> {
-    let chunks = colour_chunks(bytes);
-    let mut image = read_codes(bytes, ImageFormat::Png, &chunks, false)?;
-    let is_told = image.tags.profile.is_some() || image.warnings.iter().any(|w| w == PROFILE);
-    if chunks.has_other_colours && chunks.cicp.is_none() && !is_told {
-        let warning = "its gamma and primaries are ignored: it is read as sRGB".to_owned();
-        image.warnings.insert(0, warning);
-    }
-    Ok(image)
+    read_codes(bytes, ImageFormat::Png, &colour_chunks(bytes), false)
 }
 
 pub(super) fn read_jpeg(bytes: &[u8]) -> Result<ImageFile, String> {
-    read_codes(
-        &checked_jpeg(bytes)?,
-        ImageFormat::Jpeg,
-        &ColourChunks::default(),
-        false,
-    )
+    let whole = checked_jpeg(bytes)?;
+    let mut image = read_codes(&whole, ImageFormat::Jpeg, &ColourChunks::default(), false)?;
+    if let Some(film) = jpegs_of_film(bytes) {
+        image.warnings.push(format!(
+            "it is a film of {} JPEG pictures: the first is read",
+            film.len()
+        ));
+    }
+    Ok(image)
 }
 
 /// What can be decoded of a PNG file that is cut off; the rest is grey.
@@ -100,9 +96,11 @@ fn checked_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
 
 const PROFILE: &str = "its colour profile is not understood: it is read as sRGB";
 
+const GAMMA: &str = "its gamma and primaries are not understood: it is read as sRGB";
+
 const HDR: &str = "its codes are of PQ or HLG (HDR), which is not understood: it is read as sRGB, of which neither light nor colours are right; convert it to OpenEXR";
 
-/// cICP wins over an ICC profile; of what `is_cut` off, the rows before are kept.
+/// cICP wins over an ICC profile, and that over gAMA and cHRM; of what `is_cut` off, the rows before are kept.
 fn read_codes(
     bytes: &[u8],
     format: ImageFormat,
@@ -122,11 +120,18 @@ fn read_codes(
         (Some(cicp), _) => Some(ColourProfile::of_cicp(cicp)),
         (None, Ok(Some(icc))) => Some(ColourProfile::of_icc(icc)),
         (None, _) if chunks.has_profile => Some(Err(Unused::NotUnderstood)),
-        (None, _) => None,
+        (None, _) => chunks.other.map(ColourProfile::of_gamma),
     };
     match profile {
         Some(Ok(profile)) => tags.profile = Some(Arc::new(profile)),
-        Some(Err(Unused::NotUnderstood)) => warnings.push(PROFILE.to_owned()),
+        Some(Err(Unused::NotUnderstood)) => {
+            let warning = if chunks.other.is_some() {
+                GAMMA
+            } else {
+                PROFILE
+            };
+            warnings.push(warning.to_owned());
+        }
         Some(Err(Unused::IsHdr)) => warnings.push(HDR.to_owned()),
         Some(Err(Unused::IsSrgb)) | None => {}
     }

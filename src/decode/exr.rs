@@ -117,11 +117,8 @@ pub(super) fn read_picture(
             "its pixels are {wide} times as wide as high: give the camera `fx` and `fy` of its own pixels, not a field of view"
         ));
     }
-    if alpha.is_some() && !with_alpha {
-        warnings.push(ALPHA.to_owned());
-    }
     let mut wanted = rgb.to_vec();
-    wanted.extend(alpha.filter(|_| with_alpha));
+    wanted.extend(alpha);
     wanted.dedup();
     let kept = if alpha.is_some() && with_alpha {
         16
@@ -163,6 +160,10 @@ pub(super) fn read_picture(
         place(plane_of(index), data, window, |pixel, sample| {
             pixels[pixel][channel] = sample;
         });
+    }
+    let is_seen_through = |index: usize| plane_of(index).iter().any(|alpha| *alpha != 1.0);
+    if !with_alpha && alpha.is_some_and(is_seen_through) {
+        warnings.push(ALPHA.to_owned());
     }
     let mut coverage = Vec::new();
     if let Some(index) = alpha.filter(|_| with_alpha) {

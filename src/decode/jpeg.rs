@@ -9,6 +9,8 @@ const START: u8 = 0xd8;
 const END: u8 = 0xd9;
 const SCAN: u8 = 0xda;
 const TABLES: u8 = 0xc4;
+/// CIPA DC-007: a list of the pictures in a file.
+const MULTI_PICTURE: &[u8] = b"MPF\0";
 
 /// What is found between the start and the end of a picture.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -20,6 +22,10 @@ pub(super) struct Outline {
     pub end: Option<usize>,
     /// Where the next picture begins before this one has ended.
     pub next: Option<usize>,
+    /// Height and width, as they stand in the frame header.
+    size: Option<[u8; 4]>,
+    /// Its camera has put further pictures behind it that belong to it: views, or a map of gains.
+    has_attachments: bool,
 }
 
 /// Walks a picture that begins at `bytes[from]` with its start-of-image marker.
@@ -40,6 +46,14 @@ pub(super) fn outline(bytes: &[u8], from: usize) -> Outline {
             }
             SCAN => outline.scans += 1,
             TABLES => outline.has_tables = true,
+            0xc0..=0xcf if !matches!(code, 0xc8 | 0xcc) => {
+                let size = bytes.get(at + 3..at + 7);
+                outline.size = size.and_then(|size| size.try_into().ok());
+            }
+            0xe2 => {
+                let name = bytes.get(at + 2..at + 6);
+                outline.has_attachments |= name == Some(MULTI_PICTURE);
+            }
             _ => {}
         }
         // Segments may hold anything, a small picture too: their length tells how far to jump.
@@ -92,6 +106,15 @@ pub(crate) fn split_jpegs(bytes: &[u8]) -> Vec<Range<usize>> {
         frames.push(begin..at);
     }
     frames
+}
+
+/// Pictures of a film of JPEG pictures, one after the other and of one size; `None`: it is a picture, whatever its camera has put behind it.
+pub(crate) fn jpegs_of_film(bytes: &[u8]) -> Option<Vec<Range<usize>>> {
+    let first = outline(bytes, 0);
+    let begin = find_start(bytes, first.end?)?;
+    let is_film =
+        first.size.is_some() && first.size == outline(bytes, begin).size && !first.has_attachments;
+    is_film.then(|| split_jpegs(bytes))
 }
 
 fn find_start(bytes: &[u8], from: usize) -> Option<usize> {
@@ -194,6 +217,22 @@ mod tests {
             std::slice::from_ref(&(0..n - 1)),
             "the last is cut off"
         );
+    }
+
+    #[test]
+    fn a_picture_with_others_behind_it_is_no_film() {
+        let picture = |side: u8, note: &[u8]| {
+            let size = [0xff, 0xc0, 0, 7, 8, 0, side, 0, side];
+            let scan = [0xff, 0xda, 0, 3, 1, 5, 0xff, 0xd9];
+            [&[0xff, 0xd8][..], note, &size, &scan].concat()
+        };
+        let views = [&[0xff, 0xe2, 0, 6][..], MULTI_PICTURE].concat();
+        let count = |bytes: &[u8]| jpegs_of_film(bytes).map(|film| film.len());
+        assert_eq!(count(&picture(9, &[]).repeat(3)), Some(3));
+        assert_eq!(count(&picture(9, &[])), None);
+        assert_eq!(count(&picture(9, &views).repeat(2)), None, "two views");
+        let map = [picture(9, &[]), picture(2, &[])].concat();
+        assert_eq!(count(&map), None, "of another size");
     }
 
     #[test]

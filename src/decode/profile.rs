@@ -4,14 +4,18 @@ use std::fmt;
 
 use glam::{DMat3, DVec3};
 use moxcms::{
-    CicpProfile, ColorProfile, DataColorSpace, LocalizableString, MatrixCoefficients, ProfileText,
-    ToneReprCurve, TransferCharacteristics,
+    Chromaticity, CicpProfile, ColorPrimaries, ColorProfile, DataColorSpace, LocalizableString,
+    MatrixCoefficients, ProfileText, ToneReprCurve, TransferCharacteristics,
 };
+
+use super::png::GammaAndPrimaries;
 
 /// Codes of a curve's table.
 const CODES: usize = 1 << 16;
 /// Matrices that differ by less are one: those of sRGB profiles differ by their rounding.
 const SAME_MATRIX: f64 = 3e-3;
+/// Gammas that are believed, 1/100000: powers from 10 to 1/5.
+const GAMMAS: std::ops::RangeInclusive<u32> = 10_000..=500_000;
 
 /// XYZ of the profiles' white, in units of 1/65536.
 const D50: [u32; 3] = [0xf6d6, 0x1_0000, 0xd32d];
@@ -73,13 +77,39 @@ impl ColourProfile {
         Self::of_made(profile)
     }
 
+    /// Of a PNG file's gAMA and cHRM chunks.
+    pub(super) fn of_gamma(told: GammaAndPrimaries) -> Result<Self, Unused> {
+        let mut profile = ColorProfile::new_srgb();
+        profile.cicp = None;
+        if let Some(gamma) = told.gamma {
+            if !GAMMAS.contains(&gamma) {
+                return Err(Unused::NotUnderstood);
+            }
+            set_curve(
+                &mut profile,
+                ToneReprCurve::Parametric(vec![1e5 / gamma as f32]),
+            );
+        }
+        if let Some(places) = told.chromaticities {
+            let at = |first: usize| {
+                let [x, y] = [first, first + 1].map(|at| places[at] as f32 / 1e5);
+                Chromaticity { x, y }
+            };
+            let primaries = ColorPrimaries {
+                red: at(2),
+                green: at(4),
+                blue: at(6),
+            };
+            profile.update_rgb_colorimetry(at(0).to_xyyb(), primaries);
+        }
+        Self::of_made(profile)
+    }
+
     /// Gray spread to three channels: sRGB's primaries with the curve of the gray profile.
     fn of_curve(curve: ToneReprCurve) -> Result<Self, Unused> {
         let mut profile = ColorProfile::new_srgb();
         profile.cicp = None;
-        profile.red_trc = Some(curve.clone());
-        profile.green_trc = Some(curve.clone());
-        profile.blue_trc = Some(curve);
+        set_curve(&mut profile, curve);
         Self::of_made(profile)
     }
 
@@ -155,6 +185,12 @@ impl ColourProfile {
             (below as f64 + next) / (CODES - 1) as f64
         })
     }
+}
+
+fn set_curve(profile: &mut ColorProfile, curve: ToneReprCurve) {
+    profile.red_trc = Some(curve.clone());
+    profile.green_trc = Some(curve.clone());
+    profile.blue_trc = Some(curve);
 }
 
 /// Year, month, day, hour, minute and second of all profiles that are made here.
@@ -255,6 +291,29 @@ mod tests {
             "no clock's"
         );
         assert!(p3.linear([51400, 10280, 10280])[1] < 0.0);
+        let display_p3 = GammaAndPrimaries {
+            gamma: None,
+            chromaticities: Some([31270, 32900, 68000, 32000, 26500, 69000, 15000, 6000]),
+        };
+        let told = ColourProfile::of_gamma(display_p3).unwrap();
+        for code in [[51400, 10280, 10280], [9, 65535, 0]] {
+            let pairs = told.linear(code).into_iter().zip(p3.linear(code));
+            assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-3));
+        }
+        for gamma in [0, 9_999, u32::MAX] {
+            let told = GammaAndPrimaries {
+                gamma: Some(gamma),
+                chromaticities: None,
+            };
+            let refused = ColourProfile::of_gamma(told).unwrap_err();
+            assert_eq!(refused, Unused::NotUnderstood, "{gamma}");
+        }
+        let nowhere = GammaAndPrimaries {
+            gamma: None,
+            chromaticities: Some([0; 8]),
+        };
+        let refused = ColourProfile::of_gamma(nowhere).unwrap_err();
+        assert_eq!(refused, Unused::NotUnderstood);
         for hdr in [[12, 16, 0, 1], [9, 18, 0, 1]] {
             assert_eq!(ColourProfile::of_cicp(hdr).unwrap_err(), Unused::IsHdr);
         }

@@ -135,7 +135,7 @@ pub struct Shadows {
 impl LightFit {
     /// The photograph's shading is not that of the proxy under any such light.
     pub fn is_poor(&self) -> bool {
-        !self.gain.is_enough() || self.is_worse()
+        !self.gain.is_real() || self.is_worse()
     }
 
     /// The scene's own light explains more.

@@ -8,7 +8,7 @@ use super::fitter::{Candidate, Fitter, STRIDE, Strengths, Sun};
 use super::points::Grid;
 use super::rays::{Openness, sunlight};
 use super::residual::median_around;
-use super::verdict::Gain;
+use super::verdict::{Gain, LEAST_SIGNIFICANCE, LEAST_SIGNIFICANCE_OF_KNOWN_ROTATION};
 use super::{Explained, FitOptions, Fitted, FittedSun, LightFit, ScaleBasis, Shadows};
 use crate::math::luminance;
 use crate::packed::{MATERIAL_PHOTO_ALBEDO, NONE, PHOTO_PATCHES, PackedScene};
@@ -28,6 +28,8 @@ const ROUNDS: usize = 2;
 const ROTATION_GRID_DEG: f64 = 1.5;
 const ROTATION_UNKNOWN_ALBEDO_DEG: f64 = 6.0;
 const SUN_GRID_DEG: f64 = 0.5;
+/// The same of a sun's strength over the surroundings where the albedo is not known: suns came out 2 to 17% too weak.
+const RATIO_UNKNOWN_ALBEDO: f64 = 0.1;
 /// The same of the scale, relative: maps of known scale came out 0.3 to 0.8% off where all albedos were right.
 const SCALE_GRID: f64 = 0.005;
 /// Spread of ln of luminance that a search allows for at the least where albedos are known: most points of a floor in the sun are alike to a hundredth,
@@ -180,7 +182,7 @@ impl Search<'_> {
         suns.clear();
         suns.extend(self.fitter.suns(rotation_deg));
         meter.add(1);
-        let gain_of_sun = Gain::of(&suns, &alone, &flat);
+        let gain_of_sun = Gain::of(&suns, &alone, &flat, LEAST_SIGNIFICANCE);
         let mut sun = gain_of_sun.is_real().then(|| least(&suns).sun).flatten();
         let mut gain_of_rotation = None;
         if turns {
@@ -191,7 +193,8 @@ impl Search<'_> {
             let kept = [self
                 .fitter
                 .candidate(given_deg, sun.map(|sun| sun.direction))];
-            let gain = Gain::of(&turned, &kept, &flat);
+            let needed = self.least_significance_of_rotation();
+            let gain = Gain::of(&turned, &kept, &flat, needed);
             gain_of_rotation = Some(gain);
             if gain.is_real() {
                 rotation_deg = between(&turned);
@@ -212,7 +215,7 @@ impl Search<'_> {
         };
         let gain = Gain::over_flat(&candidates, &flat);
         let white = [self.fitter.of_light(&self.white_sky)];
-        let gain_of_white_sky = Gain::of(&white, &candidates, &flat);
+        let gain_of_white_sky = Gain::of(&white, &candidates, &flat, LEAST_SIGNIFICANCE);
         let strengths = self.strengths(rotation_deg, sun);
         let sun = sun.map(|sun| Sun {
             ratio: strengths.ratio,
@@ -223,9 +226,9 @@ impl Search<'_> {
             .uncertainty((rotation_deg, turns), sun, strengths.scale);
         let [off_ratio, off_scale] = self.off_by_pairs(rotation_deg, sun);
         let scale = self.scene_scale(strengths.scale);
-        let model_deg = match self.fitter.comparisons.are_absolute {
-            true => ROTATION_GRID_DEG,
-            false => ROTATION_UNKNOWN_ALBEDO_DEG,
+        let (model_deg, model_ratio) = match self.fitter.comparisons.are_absolute {
+            true => (ROTATION_GRID_DEG, off_ratio),
+            false => (ROTATION_UNKNOWN_ALBEDO_DEG, RATIO_UNKNOWN_ALBEDO),
         };
         let is_map = self.fitter.surroundings.len() > 1;
         LightFit {
@@ -253,7 +256,7 @@ impl Search<'_> {
                 direction: -sun.direction.as_dvec3(),
                 irradiance: scale * sun.ratio,
                 direction_sigma_deg: errors.sun_deg.map(|sigma| sigma.hypot(SUN_GRID_DEG)),
-                irradiance_sigma: errors.log_ratio.map(|sigma| sigma.hypot(off_ratio)),
+                irradiance_sigma: errors.log_ratio.map(|sigma| sigma.hypot(model_ratio)),
             }),
             gain_of_sun,
             gain_of_rotation,
@@ -356,6 +359,13 @@ impl Search<'_> {
         let sunlight = sunlight(self.fitter.scene, &self.fitter.grid.points, sun.direction);
         let surroundings = self.fitter.surroundings_at(rotation_deg);
         (self.fitter).off_by_pairs(&surroundings, &sunlight, sun.ratio)
+    }
+
+    fn least_significance_of_rotation(&self) -> f64 {
+        match self.fitter.comparisons.are_absolute {
+            true => LEAST_SIGNIFICANCE_OF_KNOWN_ROTATION,
+            false => LEAST_SIGNIFICANCE,
+        }
     }
 
     /// In textures.

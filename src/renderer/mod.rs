@@ -52,7 +52,7 @@ pub use goal::{CameraNoise, ErrorGoal, Goal};
 pub use mattes::Mattes;
 pub use motion_vectors::MotionVectors;
 pub use picture_motion::NeighbourView;
-pub use prepare::roughly_fitted_exposure_ev;
+pub use prepare::{roughly_fitted_exposure_ev, roughly_limited_albedo};
 pub use shown::Delivered;
 pub use skips::{Skip, Without};
 pub use stats::Stats;

@@ -151,8 +151,8 @@ impl PhotoLight {
         let records = scene.photo_albedo.iter_mut().zip(&self.seen);
         for ((entry, s), (light, ic)) in records.zip(self.light.iter().zip(&photo.linear)) {
             if s.depth_m > 0.0 {
-                let wanted = Vec3::from(*ic) / (*light * scale).max(Vec3::splat(1e-12));
-                limited += usize::from(wanted.max_element() > MAX_ALBEDO || wanted == Vec3::ZERO);
+                let wanted = wanted_albedo(*ic, *light * scale);
+                limited += usize::from(is_limited(wanted));
                 let albedo = wanted.clamp(Vec3::ZERO, Vec3::splat(MAX_ALBEDO));
                 entry[..3].copy_from_slice(&albedo.to_array());
             }
@@ -161,6 +161,32 @@ impl PhotoLight {
         set_patches(scene.frame.width, of_pixels, &self.seen, of_objects);
         limited
     }
+}
+
+fn wanted_albedo(shown: [f32; 3], light: Vec3) -> Vec3 {
+    Vec3::from(shown) / light.max(Vec3::splat(1e-12))
+}
+
+fn is_limited(wanted: Vec3) -> bool {
+    wanted.max_element() > MAX_ALBEDO || wanted == Vec3::ZERO
+}
+
+/// The share of [`estimate_photo_albedo`] from so few rays that it costs next to nothing.
+pub fn roughly_limited_share(scene: &mut PackedScene, photo: &Photo) -> f64 {
+    let grid = rough_grid(scene);
+    let from_photo = |flags| flags & MATERIAL_PHOTO_ALBEDO != 0;
+    let seen = first_surfaces(scene, grid.pitch_px, from_photo);
+    scene.photo_albedo = unknown_albedo(scene, &seen);
+    let points = grid_points(scene, grid.pitch_px);
+    let meter = Meter::begin(&Watcher::none(), Phase::Albedo, points);
+    let grid = trace_grid(scene, &seen, grid, &meter);
+    meter.end();
+    let (width, scale) = (scene.frame.width as usize, scene.frame.exposure_scale);
+    let wanted: Vec<Vec3> = (grid.points.iter().flatten())
+        .map(|p| wanted_albedo(photo.linear[p.y * width + p.x], p.light * scale))
+        .collect();
+    let limited = wanted.iter().filter(|wanted| is_limited(**wanted)).count();
+    limited as f64 / wanted.len().max(1) as f64
 }
 
 /// log2 of the factor that fits the real radiance to the photograph over the proxy: the median of Ic / Ir in luminance.
@@ -175,13 +201,17 @@ pub fn fit_exposure_ev(
 
 /// [`fit_exposure_ev`] from so few rays that it costs next to nothing.
 pub fn roughly_fit_exposure_ev(scene: &mut PackedScene, photo: &Photo) -> Option<f64> {
-    let pixels = scene.frame.width as usize * scene.frame.height as usize;
-    let grid = GridSpec {
-        pitch_px: pixels.div_ceil(ROUGH_POINTS).isqrt().max(ROUGH_PITCH_PX),
-        rays: ROUGH_RAYS,
-    };
+    let grid = rough_grid(scene);
     let seen = first_surfaces(scene, grid.pitch_px, |_| true);
     fit_exposure_on(scene, photo, &seen, grid, &Watcher::none())
+}
+
+fn rough_grid(scene: &PackedScene) -> GridSpec {
+    let pixels = scene.frame.width as usize * scene.frame.height as usize;
+    GridSpec {
+        pitch_px: pixels.div_ceil(ROUGH_POINTS).isqrt().max(ROUGH_PITCH_PX),
+        rays: ROUGH_RAYS,
+    }
 }
 
 fn fit_exposure_on(

@@ -27,6 +27,22 @@ pub fn roughly_fitted_exposure_ev(scene: &Scene) -> Result<Option<f64>, RenderEr
     Ok(photo_albedo::roughly_fit_exposure_ev(&mut packed, photo))
 }
 
+/// Share of the proxy whose albedo from the photograph would lie at its limit, from a few rays, where it is so large that a render tells it.
+///
+/// # Errors
+/// The scene does not fit the packed form.
+pub fn roughly_limited_albedo(scene: &Scene) -> Result<Option<f64>, RenderError> {
+    let settings = &scene.settings;
+    let may_be = settings.exposure != Exposure::Auto && settings.composite == Composite::Additive;
+    let from_photo = scene.objects.iter().any(|object| object.albedo_from_photo);
+    let Some(photo) = scene.photo.as_ref().filter(|_| may_be && from_photo) else {
+        return Ok(None);
+    };
+    let mut packed = PackedScene::build(scene, &Watcher::none())?;
+    let share = photo_albedo::roughly_limited_share(&mut packed, photo);
+    Ok((share > MOSTLY).then_some(share))
+}
+
 impl Renderer {
     /// Takes up the packed scene after an edit.
     pub(super) fn restart(

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use bytemuck::Zeroable;
 use glam::DVec3;
+use serde::Serialize;
 
 use super::plan::{Files, known_rate, views};
 use super::table::{frame_key, read_table};
@@ -34,13 +35,30 @@ struct Errors {
     own: f64,
 }
 
-/// How far projected points are from where they were seen.
-#[derive(Clone, Debug)]
+/// How far projected points are from where they were seen. Errors in pixels; `None`: no point was seen.
+#[derive(Clone, Debug, Serialize)]
 pub struct Reprojection {
-    /// A few lines for the user.
-    pub text: String,
-    /// The largest error, pixels.
-    pub worst_px: f64,
+    pub points: u64,
+    /// Points in frames without a pose, and points not in front of the camera.
+    pub without_pose: u64,
+    pub behind: u64,
+    pub rms_px: Option<f64>,
+    pub median_px: Option<f64>,
+    pub largest_px: Option<f64>,
+    /// The renderer's own projection against that of the poses in full precision, at most.
+    pub own_px: f64,
+    /// The largest errors first.
+    pub frames: Vec<FrameReprojection>,
+    /// Frames with points, seen or not.
+    pub frames_with_points: usize,
+}
+
+/// Of the points that were seen in one frame.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameReprojection {
+    pub frame: String,
+    pub points: usize,
+    pub rms_px: f64,
 }
 
 /// Projects points through the poses and renders nothing; `points` are those of a table
@@ -120,12 +138,7 @@ pub fn check_poses(
         }
         entry.own = entry.own.max(own_error(&camera, lens, point.world, pixel));
     }
-    let text = table(&errors, used, without_pose, behind);
-    let worst_px = errors
-        .values()
-        .flat_map(|e| e.seen.iter().copied())
-        .fold(0.0, f64::max);
-    Ok(Reprojection { text, worst_px })
+    Ok(Reprojection::of(&errors, used, without_pose, behind))
 }
 
 /// Distance between where the renderer's own arithmetic sees a point and where the pose puts it, pixels.
@@ -138,42 +151,63 @@ fn own_error(camera: &Camera, lens: Option<Lens>, world: DVec3, pixel: glam::DVe
     pixel.distance(glam::DVec2::new(seen.px.into(), seen.py.into()))
 }
 
-fn table(errors: &BTreeMap<String, Errors>, used: u64, without_pose: u64, behind: u64) -> String {
-    let mut all: Vec<f64> = errors
-        .values()
-        .flat_map(|e| e.seen.iter().copied())
-        .collect();
-    all.sort_by(f64::total_cmp);
-    let mut text = format!(
-        "{used} points in {} frames; {without_pose} in frames without a pose, {behind} not in front of the camera\n",
-        errors.len()
-    );
-    let square_mean = |values: &[f64]| {
-        (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
-    };
-    if let Some(largest) = all.last() {
+impl Reprojection {
+    fn of(errors: &BTreeMap<String, Errors>, points: u64, without_pose: u64, behind: u64) -> Self {
+        let mut all: Vec<f64> = (errors.values())
+            .flat_map(|e| e.seen.iter().copied())
+            .collect();
+        all.sort_by(f64::total_cmp);
+        let mut frames: Vec<FrameReprojection> = (errors.iter())
+            .filter_map(|(name, e)| {
+                Some(FrameReprojection {
+                    frame: name.clone(),
+                    points: e.seen.len(),
+                    rms_px: root_mean_square(&e.seen)?,
+                })
+            })
+            .collect();
+        frames.sort_by(|a, b| b.rms_px.total_cmp(&a.rms_px));
+        Self {
+            points,
+            without_pose,
+            behind,
+            rms_px: root_mean_square(&all),
+            median_px: all.get(all.len() / 2).copied(),
+            largest_px: all.last().copied(),
+            own_px: errors.values().map(|e| e.own).fold(0.0, f64::max),
+            frames,
+            frames_with_points: errors.len(),
+        }
+    }
+
+    /// A few lines for the user.
+    pub fn text(&self) -> String {
+        let mut text = format!(
+            "{} points in {} frames; {} in frames without a pose, {} not in front of the camera\n",
+            self.points, self.frames_with_points, self.without_pose, self.behind
+        );
+        let told = (self.rms_px.zip(self.median_px)).zip(self.largest_px);
+        if let Some(((rms, median), largest)) = told {
+            let _ = writeln!(
+                text,
+                "reprojection error in pixels: rms {rms:.3}, median {median:.3}, largest {largest:.3}"
+            );
+        }
         let _ = writeln!(
             text,
-            "reprojection error in pixels: rms {:.3}, median {:.3}, largest {largest:.3}",
-            square_mean(&all),
-            all[all.len() / 2]
+            "the renderer's own projection is off by at most {:.5} px",
+            self.own_px
         );
+        for frame in self.frames.iter().take(NAMED) {
+            let _ = writeln!(text, "{}: rms {:.3} px", frame.frame, frame.rms_px);
+        }
+        text
     }
-    let own = errors.values().map(|e| e.own).fold(0.0, f64::max);
-    let _ = writeln!(
-        text,
-        "the renderer's own projection is off by at most {own:.5} px"
-    );
-    let mut frames: Vec<(&String, f64)> = errors
-        .iter()
-        .filter(|(_, e)| !e.seen.is_empty())
-        .map(|(name, e)| (name, square_mean(&e.seen)))
-        .collect();
-    frames.sort_by(|a, b| b.1.total_cmp(&a.1));
-    for (name, rms) in frames.into_iter().take(NAMED) {
-        let _ = writeln!(text, "{name}: rms {rms:.3} px");
-    }
-    text
+}
+
+fn root_mean_square(values: &[f64]) -> Option<f64> {
+    let sum: f64 = values.iter().map(|x| x * x).sum();
+    (!values.is_empty()).then(|| (sum / values.len() as f64).sqrt())
 }
 
 /// `frame,x_px,y_px,x_m,y_m,z_m` a line; `frame` is a number or a file name, the pixel may be empty.

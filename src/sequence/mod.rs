@@ -27,7 +27,7 @@ mod whole;
 
 use std::path::PathBuf;
 
-pub use check::{Reprojection, check_poses};
+pub use check::{FrameReprojection, Reprojection, check_poses};
 pub use driver::{RenderedSequence, render_sequence};
 pub use report::{FrameCounts, SequenceSeconds, SequenceStats};
 pub use scale::{ScaleFrom, Sighting, read_clicks};

@@ -231,6 +231,30 @@ fn light_that_does_not_fit_the_photograph_is_told() {
     }
 }
 
+/// Of a reddish table one channel alone asks for more light than its albedo can make up.
+#[test]
+fn albedo_at_its_limit_is_told_before_a_render_tells_it() {
+    let folder = Folder::new();
+    folder.save("photo.png", 64, 48, |_, _| [250, 150, 120]);
+    let table = TABLE
+        .lines()
+        .map(|line| match line.starts_with("material") {
+            true => "albedo = \"from-photo\"",
+            false => line,
+        });
+    let table = table.collect::<Vec<_>>().join("\n");
+    for (ev, is_told) in [(0.2, false), (-0.5, true)] {
+        let photo = format!("[photo]\nimage = \"photo.png\"\nexposure_ev = {ev}\n");
+        folder.write("scene.toml", format!("{photo}{table}\n{BALL}"));
+        let checked = stdout(&folder.run("check scene.toml"));
+        let rendered = stderr(&folder.run("render scene.toml -o out.png"));
+        for said in [&checked, &rendered] {
+            assert_eq!(said.contains("lies at its limit"), is_told, "{ev}: {said}");
+        }
+        assert!(!checked.contains("stops too"), "control: {checked}");
+    }
+}
+
 /// A grey JPEG whose tags note a focal length as on 35 mm film.
 fn noted(focal_mm: u16) -> Vec<u8> {
     let mut jpeg = Vec::new();

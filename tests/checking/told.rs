@@ -37,6 +37,13 @@ fn every_kind_of_file_is_told_what_it_is() {
     assert_eq!(line(&photo, "size"), "6 x 4 pixels");
     assert_eq!(line(&photo, "colours"), "sRGB");
 
+    folder.save("a.jpg", 16, 8, |x, _| [x as u8; 3]);
+    assert_eq!(line(&info("a.jpg"), "file"), "a JPEG picture", "control");
+    folder.write("a.mjpeg", folder.bytes("a.jpg").repeat(3));
+    let film = info("a.mjpeg");
+    assert_eq!(line(&film, "file"), "a film of JPEG pictures");
+    assert_eq!(line(&film, "frames"), "3");
+
     folder.write("scene.toml", format!("{TABLE}{BALL}"));
     let scene = info("scene.toml");
     assert!(

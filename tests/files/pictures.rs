@@ -152,10 +152,15 @@ fn gama45455() {
     folder.write("p.png", with_chunks(&[(b"gAMA", &45455_u32.to_be_bytes())]));
     let said = render(&folder);
     assert!(!said.contains("gamma"), "{said}");
+    assert_eq!(profile_of(&folder.bytes("out.png")), None);
     folder.write(
         "p.png",
         with_chunks(&[(b"gAMA", &100_000_u32.to_be_bytes())]),
     );
+    let said = render(&folder);
+    assert!(!said.contains("gamma"), "{said}");
+    assert!(profile_of(&folder.bytes("out.png")).is_some(), "control");
+    folder.write("p.png", with_chunks(&[(b"gAMA", &[0; 4])]));
     let said = render(&folder);
     assert!(said.contains("gamma"), "control: {said}");
 }

@@ -220,9 +220,20 @@ fn known_points_of_the_webcam_videos_are_where_the_poses_put_them() {
             .collect();
         folder.write("points.csv", seen.concat());
         assert_eq!(
-            check(&[]).status.code(),
+            check(&["--stats", "check.json"]).status.code(),
             Some(1),
             "control: points that were seen elsewhere"
+        );
+        let told = folder.json("check.json");
+        assert_eq!(told["points"], posed, "{told:#}");
+        let worst = |key: &str| told[key].as_f64().expect("a number");
+        assert!(
+            worst("largest_px") > 2.0 && worst("own_px") < 0.01,
+            "{told:#}"
+        );
+        assert_eq!(
+            told["frames"].as_array().map(Vec::len),
+            Some(posed as usize)
         );
     }
 }

@@ -67,6 +67,19 @@ fn frames(folder: &Folder, settings: &NoiseSettings, seed: u32, count: u32) -> N
     .profile
 }
 
+/// A shell names them by letters: 10, 100, 9.
+#[test]
+fn frames_are_read_in_the_order_of_their_numbers() {
+    let folder = Folder::new();
+    let save = |number| folder.save(&format!("frame{number}.png"), 4, 4, |_, _| [9; 3]);
+    let scenes = group_frames(&[10, 100, 9].map(save)).unwrap();
+    let numbers = scenes[0].paths.iter().map(|path| {
+        let name = path.file_stem().unwrap().to_string_lossy();
+        name.trim_start_matches("frame").to_owned()
+    });
+    assert_eq!(numbers.collect::<Vec<_>>(), ["9", "10", "100"]);
+}
+
 /// Relative errors of sigma over bins and channels: median and largest.
 fn sigma_errors(found: &NoiseProfile, truth: &NoiseProfile) -> (f64, f64) {
     let mut errors: Vec<f64> = found

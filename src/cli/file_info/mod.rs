@@ -41,7 +41,7 @@ pub(super) fn describe(path: &Path) -> Result<String, Failure> {
             report.line("file", name);
             report.line(
                 "use",
-                "frames of `mixray sequence`; films other than Y4M go through ffmpeg",
+                "frames of `mixray sequence`; films other than Y4M and JPEG pictures go through ffmpeg",
             );
         }
         Some(kind @ FileKind::ForeignModel(_)) => {

@@ -10,7 +10,7 @@ use image::metadata::Orientation;
 
 use super::Report;
 use crate::cli::Failure;
-use crate::decode::{ImageFile, MAX_PICTURE_BYTES, Pixels, read_file, read_image};
+use crate::decode::{ImageFile, MAX_PICTURE_BYTES, Pixels, jpegs_of_film, read_file, read_image};
 use crate::math::luminance;
 use crate::output::read_film;
 use crate::scene::Choice;
@@ -50,8 +50,19 @@ pub(super) fn describe(path: &Path, name: &str, report: &mut Report) -> Result<(
     }
     let image =
         read_image(path).map_err(|problem| Failure(format!("{}: {problem}", path.display())))?;
+    let size = format!("{} x {} pixels", image.width, image.height);
+    if name.contains("JPEG") {
+        let bytes = read_file(path, MAX_PICTURE_BYTES).map_err(Failure)?;
+        if let Some(film) = jpegs_of_film(&bytes) {
+            report.line("file", "a film of JPEG pictures");
+            report.line("size", size);
+            report.line("frames", film.len());
+            report.line("use", "frames of `mixray sequence` and `mixray track`");
+            return Ok(());
+        }
+    }
     report.line("file", name);
-    report.line("size", format!("{} x {} pixels", image.width, image.height));
+    report.line("size", size);
     match &image.pixels {
         Pixels::Codes8(_) | Pixels::Codes16(_) => of_codes(path, &image, report)?,
         Pixels::Linear(pixels) => of_light(&image, pixels, report),

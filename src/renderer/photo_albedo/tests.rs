@@ -158,9 +158,15 @@ fn light_that_does_not_fit_is_counted() {
         let mut packed = PackedScene::build(scene, &Watcher::none()).expect("packs");
         estimate_photo_albedo(&mut packed, &photo, &Watcher::none()).1
     };
+    let rough = |scene: &Scene| {
+        let mut packed = PackedScene::build(scene, &Watcher::none()).expect("packs");
+        roughly_limited_share(&mut packed, &photo)
+    };
     assert_eq!(share(&scene), 0.0, "control");
+    assert_eq!(rough(&scene), 0.0, "control");
     scene.environment.as_mut().expect("has one").map = EnvironmentMap::Constant([0.125; 3]);
     assert!(share(&scene) > 0.9);
+    assert!(rough(&scene) > 0.9);
 }
 
 /// Of a draft: another exposure and camera take the light that was found, and come to the albedo of an estimate of their own. Control: the albedo of

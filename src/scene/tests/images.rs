@@ -115,7 +115,7 @@ fn with_chunk(png: &[u8], name: &[u8; 4], data: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn gamma_chunks_are_ignored_with_a_warning() {
+fn gamma_chunks_say_what_codes_mean_where_nothing_else_does() {
     let folder = Folder::new();
     let mut plain = std::io::Cursor::new(Vec::new());
     let rgb = image::RgbImage::from_pixel(4, 3, image::Rgb([100, 150, 200]));
@@ -123,22 +123,25 @@ fn gamma_chunks_are_ignored_with_a_warning() {
     let plain = plain.into_inner();
     let gamma = with_chunk(&plain, b"gAMA", &100_000_u32.to_be_bytes());
     let both = with_chunk(&gamma, b"sRGB", &[0]);
-    for (name, bytes, warns) in [
-        ("plain.png", &plain, false),
-        ("gamma.png", &gamma, true),
-        ("both.png", &both, false),
+    let none = with_chunk(&plain, b"gAMA", &0_u32.to_be_bytes());
+    let codes = [100_u8, 150, 200];
+    let srgb = codes.map(decode8);
+    let linear = codes.map(|code| f32::from(code) / 255.0);
+    for (name, bytes, light, warns) in [
+        ("plain.png", &plain, srgb, false),
+        ("gamma.png", &gamma, linear, false),
+        ("both.png", &both, srgb, false),
+        ("none.png", &none, srgb, true),
     ] {
         std::fs::write(folder.path(name), bytes).unwrap();
         let scene = folder.photo(name).unwrap();
-        assert_eq!(
-            scene.warnings.iter().any(|w| w.contains("gamma")),
-            warns,
-            "{name}: {:?}",
-            scene.warnings
-        );
-        assert!(
-            matches!(&scene.photo.unwrap().encoded, EncodedPhoto::Codes8(codes) if codes[0] == [100, 150, 200])
-        );
+        let told = scene.warnings.iter().any(|w| w.contains("gamma"));
+        assert_eq!(told, warns, "{name}: {:?}", scene.warnings);
+        let photo = scene.photo.unwrap();
+        assert!(matches!(&photo.encoded, EncodedPhoto::Codes8(kept) if kept[0] == codes));
+        let pairs = photo.linear[0].into_iter().zip(light);
+        let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(off < 1e-4, "{name}: {:?}, not {light:?}", photo.linear[0]);
     }
 }
 
@@ -174,6 +177,13 @@ fn exr_and_hdr_are_linear() {
     assert_eq!((photo.width, photo.height), (4, 3));
     let pixel = 5.0_f32 / 7.0;
     assert_eq!(photo.linear[5], [-pixel, 10.0 - pixel, 20.0 - pixel]);
+    for (alpha, is_told) in [(1.0, false), (0.5, true)] {
+        let value = |channel, _| if channel == 3 { alpha } else { 0.25 };
+        folder.write_exr("rgba.exr", &["R", "G", "B", "A"], value);
+        let warnings = folder.photo("rgba.exr").unwrap().warnings;
+        let told = warnings.iter().any(|w| w.contains("alpha"));
+        assert_eq!(told, is_told, "{alpha}: {warnings:?}");
+    }
     folder.write_exr("grey.exr", &["Y"], |_, pixel| pixel as f32);
     assert_eq!(
         folder.photo("grey.exr").unwrap().photo.unwrap().linear[5],

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::CalibrationError;
+use crate::scene::trajectory::Naming;
 use crate::scene::{EncodedPhoto, read_codes};
 
 /// The frames of one static scene, in order.
@@ -27,7 +28,8 @@ impl SceneFrames {
     }
 }
 
-/// Sorts frames into scenes by the folder they lie in; a folder stands for the pictures in it, by name.
+/// Sorts frames into scenes by the folder they lie in; a folder stands for the pictures in it. In the order of the numbers in
+/// their names, or of letters.
 ///
 /// # Errors
 /// A folder that cannot be read, or has no pictures.
@@ -67,7 +69,23 @@ pub fn group_frames(arguments: &[PathBuf]) -> Result<Vec<SceneFrames>, Calibrati
             }
         }
     }
+    for scene in &mut scenes {
+        scene.paths = in_order(std::mem::take(&mut scene.paths));
+    }
     Ok(scenes)
+}
+
+/// `frame10` comes after `frame9`, in whichever order a shell names them.
+fn in_order(paths: Vec<PathBuf>) -> Vec<PathBuf> {
+    let name = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    };
+    let mut named: Vec<(String, PathBuf)> = (paths.into_iter())
+        .map(|path| (name(&path), path))
+        .collect();
+    Naming::of(named.iter().map(|(name, _)| name.as_str())).sort(&mut named);
+    named.into_iter().map(|(_, path)| path).collect()
 }
 
 fn scene_name(folder: &Path) -> String {
@@ -99,7 +117,6 @@ fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, CalibrationError> {
             folder: folder.to_path_buf(),
         });
     }
-    paths.sort();
     Ok(paths)
 }
 

@@ -277,7 +277,7 @@ fn points(path: &Path) -> Outcome {
     named_outcome(
         path,
         check_poses(&options, Some(path), &|_| {}),
-        |reprojection| finite([reprojection.worst_px], "a reprojection"),
+        |reprojection| finite(reprojection.largest_px, "a reprojection"),
     )
 }
 
