@@ -63,7 +63,7 @@ impl Quantity {
                 Opening::FNumber { f_number, .. } => Some(f_number),
                 Opening::RadiusM(_) => None,
             },
-            Self::FocusDistance => Some(composition.lens.focus_distance_m),
+            Self::FocusDistance => Some(composition.focus_distance_m()),
             Self::Blades => match composition.lens.aperture {
                 Aperture::Blades(blades) => Some(f64::from(blades)),
                 Aperture::Disc | Aperture::Square => Some(0.0),
@@ -100,7 +100,7 @@ impl Quantity {
                     *f_number = value;
                 }
             }
-            Self::FocusDistance => composition.lens.focus_distance_m = value,
+            Self::FocusDistance => composition.focus(value),
             Self::Blades => {
                 composition.lens.aperture = match value < 3.0 {
                     true => Aperture::Disc,

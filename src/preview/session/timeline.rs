@@ -66,15 +66,12 @@ impl Session {
 
     /// What a frame brings is no edit: it is that of the frame which is shown.
     pub(super) fn keep_frame(&self, composition: &mut Composition, of: &Composition) {
-        let Some(frames) = &self.frames else {
+        if self.frames.is_none() {
             return;
-        };
-        composition.camera = of.camera;
+        }
+        (composition.camera, composition.frame) = (of.camera, of.frame);
         if let (Some(shutter), Some(own)) = (&mut composition.shutter, of.shutter) {
             shutter.time_secs = own.time_secs;
-        }
-        if frames.pull_focus() {
-            composition.lens.focus_distance_m = of.lens.focus_distance_m;
         }
     }
 
