@@ -328,8 +328,14 @@ impl Composition {
         scene.settings.max_bounces = self.max_bounces;
         scene.settings.seed = self.seed;
         for (index, object) in scene.objects.iter_mut().enumerate() {
-            object.motion = self.motion(index);
-            object.world_from_object = self.world_from_object(index);
+            // What the reader placed is no product of these numbers to the last bit.
+            let is_kept = object.motion.is_none()
+                && self.motions[index].is_empty()
+                && Placement::of(object.world_from_object) == self.objects[index];
+            if !is_kept {
+                object.motion = self.motion(index);
+                object.world_from_object = self.world_from_object(index);
+            }
         }
         for (object, form) in scene.objects.iter_mut().zip(&self.materials) {
             if let Some(form) = form {

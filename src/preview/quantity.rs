@@ -85,7 +85,10 @@ impl Quantity {
             Self::CartoonIterations => (stages.cartoon).map(|c| f64::from(c.iterations)),
             Self::CartoonSigmaP => stages.cartoon.map(|cartoon| decimal(cartoon.sigma_p)),
             Self::ExposureTime => composition.shutter.map(|shutter| shutter.exposure_secs),
-            Self::Time => composition.shutter.map(|shutter| shutter.time_secs),
+            Self::Time => {
+                let has_time = composition.shutter.is_some() || composition.has_keys();
+                has_time.then(|| composition.time_secs())
+            }
         }
     }
 
@@ -160,8 +163,8 @@ impl Quantity {
                 }
             }
             Self::Time => {
-                if let Some(shutter) = &mut composition.shutter {
-                    shutter.time_secs = value;
+                if self.of(composition).is_some() {
+                    composition.set_time(value);
                 }
             }
         }

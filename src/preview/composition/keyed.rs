@@ -4,7 +4,7 @@ use glam::{DMat4, DVec3};
 
 use super::{Composition, LensForm, Placement};
 use crate::preview::keyframes::Keys;
-use crate::scene::{FocusPath, Lens, MotionKey, ObjectMotion};
+use crate::scene::{FocusPath, Lens, MotionKey, ObjectMotion, Shutter};
 
 /// What can have keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +14,20 @@ pub enum Track {
 }
 
 impl Composition {
+    /// The picture's time is another from now on; a shutter that is made for it stays closed.
+    pub fn set_time(&mut self, time_secs: f64) {
+        let closed = Shutter {
+            exposure_secs: 0.0,
+            readout_secs: 0.0,
+            samples: None,
+            time_secs,
+        };
+        self.shutter = Some(Shutter {
+            time_secs,
+            ..self.shutter.unwrap_or(closed)
+        });
+    }
+
     /// As it is focused at the picture's time.
     pub fn lens(&self) -> Lens {
         LensForm {

@@ -229,6 +229,11 @@ impl Session {
         self.show_from(&before.composition);
     }
 
+    /// Edits of one thing are undone together until [`Session::end_gesture`].
+    pub fn begin_gesture(&mut self) {
+        self.history.begin_gesture();
+    }
+
     /// The next edit is undone by itself.
     pub fn end_gesture(&mut self) {
         self.history.end_gesture();

@@ -7,7 +7,6 @@ use super::Session;
 use crate::preview::composition::{Composition, rounded};
 use crate::preview::frames::Frames;
 use crate::preview::still::Still;
-use crate::scene::Shutter;
 use crate::sequence::SequenceOptions;
 
 impl Session {
@@ -42,19 +41,7 @@ impl Session {
     /// The picture's time among the scene's own keys.
     pub fn set_time(&mut self, time_secs: f64) {
         self.edit("time", |composition| {
-            let time_secs = rounded(time_secs, 1e-4);
-            composition.shutter = Some(match composition.shutter {
-                Some(shutter) => Shutter {
-                    time_secs,
-                    ..shutter
-                },
-                None => Shutter {
-                    exposure_secs: 0.0,
-                    readout_secs: 0.0,
-                    samples: None,
-                    time_secs,
-                },
-            });
+            composition.set_time(rounded(time_secs, 1e-4));
         });
     }
 

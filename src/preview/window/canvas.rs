@@ -214,7 +214,7 @@ impl Canvas {
         if response.drag_started()
             && let Some(at) = ui.input(|input| input.pointer.press_origin())
         {
-            session.end_gesture();
+            session.begin_gesture();
             self.gesture = Some(self.begin(ui, response, session, at, modifiers));
         }
         if response.dragged()

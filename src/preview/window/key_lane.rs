@@ -131,7 +131,7 @@ impl KeyLane {
             axis.time_secs(f64::from(share))
         };
         if response.drag_started() {
-            session.end_gesture();
+            session.begin_gesture();
             let from = ui.input(|input| input.pointer.press_origin());
             self.held = from.and_then(&under);
         }
