@@ -33,6 +33,7 @@ pub(super) fn scene(camera: Camera, rays_per_pixel: u32, objects: Vec<Object>) -
         lights: Vec::new(),
         shutter: None,
         camera_path: Default::default(),
+        focus_path: Default::default(),
         objects,
         settings: Settings {
             rays_per_pixel,

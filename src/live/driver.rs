@@ -22,8 +22,8 @@ use crate::renderer::{
 use crate::scene::Composite;
 use crate::scene::trajectory::{CameraPath, FrameName, Intrinsics, read_intrinsics};
 use crate::scene::{
-    Camera, Content, ContentHash, EncodedPhoto, Given, MotionBlurMethod, Object, Photo, Scene,
-    load_with,
+    Camera, Content, ContentHash, EncodedPhoto, FocusPath, Given, MotionBlurMethod, Object, Photo,
+    Scene, load_with,
 };
 use crate::stages::{Finished, GpuStages, finish};
 use crate::tracking::{Follower, KnownBoard, Lens, Luma, read_known_board};
@@ -149,6 +149,7 @@ struct Started {
     /// The scene's, at the pose of the moment.
     camera: Camera,
     lens: crate::scene::Lens,
+    focus_path: FocusPath,
     seed: u32,
     anchor: Option<DVec3>,
     /// When the frame before was, and from where, unless it passed through.
@@ -327,6 +328,7 @@ impl Live<'_> {
                 None => follower,
             },
             lens: scene.lens,
+            focus_path: scene.focus_path.clone(),
             camera,
             seed: scene.settings.seed,
             anchor: None,
@@ -352,6 +354,7 @@ impl Live<'_> {
             Some(rate) => f64::from(number) / rate,
             None => self.begin.elapsed().as_secs_f64(),
         };
+        let focus_m = started.focus_path.distance_m(time_secs);
         let near = |at: &f64| (time_secs - at).abs() <= LONGEST_MOTION_SECS;
         let before = started.before.replace((time_secs, world_from_camera));
         let keys = before.filter(|(at, _)| near(at)).into_iter();
@@ -375,7 +378,10 @@ impl Live<'_> {
         let edit = FrameEdit {
             photo: Some(photo.clone()),
             camera,
-            lens: started.lens,
+            lens: crate::scene::Lens {
+                focus_distance_m: focus_m.unwrap_or(started.lens.focus_distance_m),
+                ..started.lens
+            },
             camera_path,
             time_secs,
             seed: started.seed.wrapping_add(number),

@@ -29,6 +29,8 @@ pub use film_note::FilmNote;
 pub use layers::{ExrLayer, ExrLayers};
 pub use metadata::Metadata;
 pub use plain::{write_composite, write_image};
+#[cfg(feature = "preview")]
+pub(crate) use png_file::code8;
 pub(crate) use png_file::{PNG_END, picture_codes8};
 pub use png_file::{PngBits, write_png};
 pub use reference_file::write_reference;

@@ -50,11 +50,13 @@ pub fn write_png(
                 srgb: encode16,
                 of_share: |x| (x * 65535.0 + 0.5).floor() as u16,
             };
-            let codes = codes(picture, photo, encode, |encoded, pixel| match encoded {
+            let code = code(photo, encode, |encoded, pixel| match encoded {
                 EncodedPhoto::Codes8(codes) => Some(codes[pixel].map(|c| u16::from(c) * 257)),
                 EncodedPhoto::Codes16(codes) => Some(codes[pixel]),
                 EncodedPhoto::Linear => None,
             });
+            let values = picture.linear.par_iter().enumerate();
+            let codes: Vec<[u16; 3]> = values.map(|(pixel, value)| code(pixel, *value)).collect();
             let bytes = bytemuck::cast_slice(codes.as_flattened()).to_vec();
             (bytes, ExtendedColorType::Rgb16)
         }
@@ -83,11 +85,18 @@ pub fn write_png(
 
 /// Codes of 8 bits as [`write_png`] writes them.
 pub(crate) fn picture_codes8(picture: &Picture, photo: Option<&Photo>) -> Vec<[u8; 3]> {
+    let code = code8(photo);
+    let values = picture.linear.par_iter().enumerate();
+    values.map(|(pixel, value)| code(pixel, *value)).collect()
+}
+
+/// The code of 8 bits of a pixel's linear value.
+pub(crate) fn code8(photo: Option<&Photo>) -> impl Fn(usize, [f32; 3]) -> [u8; 3] + Sync {
     let encode = Encoding {
         srgb: encode8,
         of_share: |x| (x * 255.0 + 0.5).floor() as u8,
     };
-    codes(picture, photo, encode, |encoded, pixel| match encoded {
+    code(photo, encode, |encoded, pixel| match encoded {
         EncodedPhoto::Codes8(codes) => Some(codes[pixel]),
         _ => None,
     })
@@ -99,29 +108,23 @@ struct Encoding<T> {
     of_share: fn(f64) -> T,
 }
 
-/// In the photograph's colours.
-fn codes<T: Copy + Send>(
-    picture: &Picture,
+/// In the photograph's colours; a pixel of the photograph's own value has its own code.
+fn code<T: Copy>(
     photo: Option<&Photo>,
     encode: Encoding<T>,
     own_code: impl Fn(&EncodedPhoto, usize) -> Option<[T; 3]> + Sync,
-) -> Vec<[T; 3]> {
+) -> impl Fn(usize, [f32; 3]) -> [T; 3] + Sync {
     let profile = photo.and_then(|photo| photo.tags.profile.as_deref());
-    let of_linear = |value: [f32; 3]| match profile {
+    let of_linear = move |value: [f32; 3]| match profile {
         None => value.map(encode.srgb),
         Some(profile) => profile.encoded(value).map(encode.of_share),
     };
-    picture
-        .linear
-        .par_iter()
-        .enumerate()
-        .map(|(pixel, value)| {
-            photo
-                .filter(|photo| photo.linear[pixel].map(f32::to_bits) == value.map(f32::to_bits))
-                .and_then(|photo| own_code(&photo.encoded, pixel))
-                .unwrap_or_else(|| of_linear(*value))
-        })
-        .collect()
+    move |pixel, value| {
+        photo
+            .filter(|photo| photo.linear[pixel].map(f32::to_bits) == value.map(f32::to_bits))
+            .and_then(|photo| own_code(&photo.encoded, pixel))
+            .unwrap_or_else(|| of_linear(value))
+    }
 }
 
 #[cfg(test)]

@@ -333,6 +333,13 @@ impl PackedScene {
         Ok(())
     }
 
+    /// A virtual object is made of another material, and nothing is made of the one before; its triangles are as they were.
+    pub fn replace_material(&mut self, before: &Arc<Material>, material: &Arc<Material>) {
+        let mut table = std::mem::take(&mut self.material_table);
+        table.replace(self, before, material);
+        self.material_table = table;
+    }
+
     fn add_material(
         &mut self,
         material: &Arc<Material>,

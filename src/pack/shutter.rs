@@ -21,7 +21,7 @@ pub struct Instant {
 pub fn traced_shutter(scene: &Scene) -> Option<Shutter> {
     let copies = (scene.stages.motion_blur)
         .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);
-    (scene.shutter).filter(|s| !copies && s.exposure_secs + s.readout_secs > 0.0)
+    (scene.shutter).filter(|shutter| !copies && shutter.is_open())
 }
 
 impl PackedScene {

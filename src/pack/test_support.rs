@@ -35,6 +35,7 @@ pub fn test_scene() -> Scene {
         objects: Vec::new(),
         shutter: None,
         camera_path: Default::default(),
+        focus_path: Default::default(),
         settings: Settings {
             rays_per_pixel: 4,
             max_bounces: 2,

@@ -95,6 +95,21 @@ impl MaterialTable {
         index
     }
 
+    /// Packs a virtual object's material in the place of another that nothing else is made of; nothing happens where that was never packed.
+    pub(crate) fn replace(
+        &mut self,
+        packed: &mut PackedScene,
+        before: &Arc<scene::Material>,
+        material: &Arc<scene::Material>,
+    ) {
+        let key = |material| MaterialKey::new(material, 0.0, false);
+        if let Some((_, index)) = self.materials.remove(&key(before)) {
+            let key = key(material);
+            packed.materials[index as usize] = self.pack(packed, material, &key);
+            self.materials.insert(key, (material.clone(), index));
+        }
+    }
+
     /// Index of a material that is packed already.
     pub fn known(&self, key: &MaterialKey) -> Option<u32> {
         self.materials.get(key).map(|(_, index)| *index)

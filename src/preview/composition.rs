@@ -3,10 +3,15 @@
 //! Every number is kept in the form in which the scene file has it, and becomes the scene's by the reader's own operations: what is saved
 //! and read again is the same scene, bit for bit.
 
+mod keyed;
+
 use glam::{DMat3, DMat4, DQuat, DVec3, EulerRot};
 
+pub use keyed::Track;
+
+use super::keyframes::Keys;
 use super::material_form::MaterialForm;
-use crate::scene::{Aperture, Exposure, Lens, Scene, Shutter, Side, Stages};
+use crate::scene::{Aperture, Exposure, Lens, Object, Scene, Shutter, Side, Stages};
 
 /// All that can be edited.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,13 +24,25 @@ pub struct Composition {
     pub rays_per_pixel: u32,
     pub max_bounces: u32,
     pub seed: u32,
-    /// In the order of [`Scene::objects`]: the real ones first.
+    /// In the order of [`Scene::objects`]: the real ones first. Where an object has keys, they come after it.
     pub objects: Vec<Placement>,
+    /// In the same order: transforms after the object's own.
+    pub motions: Vec<Keys<Placement>>,
+    /// Distances in metres, in place of the lens's own.
+    pub focus_keys: Keys<f64>,
     /// In the same order; `None`: the file replaces nothing of what the object brings.
     pub materials: Vec<Option<MaterialForm>>,
     pub stages: Stages,
     /// `None`: nothing moves while the picture is taken.
     pub shutter: Option<Shutter>,
+    pub frame: FrameLead,
+}
+
+/// What a video's frame brings in place of the scene's own; no scene file has it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrameLead {
+    pub time_secs: Option<f64>,
+    pub focus_distance_m: Option<f64>,
 }
 
 /// World-from-camera.
@@ -137,6 +154,45 @@ impl LensForm {
 }
 
 impl Placement {
+    pub const IDENTITY: Self = Self {
+        translation: DVec3::ZERO,
+        rotation: Rotation::EulerDeg(DVec3::ZERO),
+        scale: DVec3::ONE,
+    };
+
+    /// Of a transform without shear.
+    pub fn of(world_from_object: DMat4) -> Self {
+        let (scale, rotation, translation) = world_from_object.to_scale_rotation_translation();
+        Self {
+            translation,
+            rotation: Rotation::Quaternion(rotation),
+            scale,
+        }
+    }
+
+    /// Its scale at the origin.
+    fn scale_alone(&self) -> Self {
+        Self {
+            scale: self.scale,
+            ..Self::IDENTITY
+        }
+    }
+
+    /// In short numbers, as edits are.
+    fn tidy(&self) -> Self {
+        Self {
+            translation: rounded_m(self.translation),
+            rotation: match self.rotation {
+                Rotation::Quaternion(quaternion) => Rotation::of(quaternion),
+                degrees @ Rotation::EulerDeg(_) => degrees,
+            },
+            scale: self.scale.map(|factor| match rounded(factor, 1e-6) {
+                0.0 => factor,
+                short => short,
+            }),
+        }
+    }
+
     pub fn world_from_object(&self) -> DMat4 {
         let rotation = self.rotation.quaternion();
         DMat4::from_scale_rotation_translation(self.scale, rotation, self.translation)
@@ -184,6 +240,10 @@ pub struct Difference {
     pub transport: bool,
     pub samples: bool,
     pub objects: Vec<usize>,
+    /// Keys of objects, or the time: the same places may come about in another way.
+    pub motion: bool,
+    /// Those made of another material.
+    pub materials: Vec<usize>,
     /// What works on the finished film alone.
     pub stages: bool,
     /// What no renderer takes up: it is built anew.
@@ -192,19 +252,30 @@ pub struct Difference {
 
 impl Difference {
     pub fn between(a: &Composition, b: &Composition) -> Self {
-        let objects = a.objects.iter().zip(&b.objects).enumerate();
+        let differs = |index: usize| {
+            let is_same = a.objects[index] == b.objects[index]
+                && a.motions[index] == b.motions[index]
+                && (a.motions[index].is_empty() || a.time_secs() == b.time_secs());
+            !is_same && a.world_from_object(index) != b.world_from_object(index)
+        };
+        let open = |c: &Composition| c.shutter.filter(Shutter::is_open);
+        let moves = a.motions.iter().any(|keys| !keys.is_empty());
+        let motion = a.motions != b.motions || (moves && a.time_secs() != b.time_secs());
         Self {
             camera: a.camera != b.camera,
-            lens: a.lens != b.lens,
+            lens: a.lens() != b.lens(),
             environment: a.environment != b.environment,
             transport: (a.exposure, a.max_bounces) != (b.exposure, b.max_bounces),
             samples: (a.rays_per_pixel, a.seed) != (b.rays_per_pixel, b.seed),
-            objects: objects
-                .filter(|(_, (a, b))| a != b)
-                .map(|(index, _)| index)
+            objects: (0..a.objects.len().min(b.objects.len()))
+                .filter(|index| differs(*index))
+                .collect(),
+            motion,
+            materials: (0..a.materials.len().min(b.materials.len()))
+                .filter(|index| a.materials[*index] != b.materials[*index])
                 .collect(),
             stages: a.stages != b.stages,
-            built: (&a.materials, a.shutter) != (&b.materials, b.shutter),
+            built: open(a) != open(b) || (open(a).is_some() && motion),
         }
     }
 
@@ -234,8 +305,10 @@ impl Difference {
                 transport: true, ..
             } => "exposure or bounces",
             Self { samples: true, .. } => "rays",
-            Self { built: true, .. } => "material or shutter",
+            _ if !self.materials.is_empty() => "material",
+            Self { built: true, .. } => "shutter",
             Self { stages: true, .. } => "stages",
+            Self { motion: true, .. } => "keys",
             _ => "none",
         }
     }
@@ -245,7 +318,8 @@ impl Composition {
     /// The scene with everything as it is set here.
     pub fn apply(&self, scene: &mut Scene) {
         scene.camera.world_from_camera = self.camera.world_from_camera();
-        scene.lens = self.lens.lens();
+        scene.lens = self.lens();
+        scene.focus_path = self.focus_path();
         if let (Some(environment), Some(form)) = (&mut scene.environment, self.environment) {
             (environment.rotation_deg, environment.scale) = (form.rotation_deg, form.scale);
         }
@@ -253,9 +327,14 @@ impl Composition {
         scene.settings.rays_per_pixel = self.rays_per_pixel;
         scene.settings.max_bounces = self.max_bounces;
         scene.settings.seed = self.seed;
-        for (object, placement) in scene.objects.iter_mut().zip(&self.objects) {
-            if !object.is_animated() {
-                object.world_from_object = placement.world_from_object();
+        for (index, object) in scene.objects.iter_mut().enumerate() {
+            // What the reader placed is no product of these numbers to the last bit.
+            let is_kept = object.motion.is_none()
+                && self.motions[index].is_empty()
+                && Placement::of(object.world_from_object) == self.objects[index];
+            if !is_kept {
+                object.motion = self.motion(index);
+                object.world_from_object = self.world_from_object(index);
             }
         }
         for (object, form) in scene.objects.iter_mut().zip(&self.materials) {
@@ -267,21 +346,23 @@ impl Composition {
         scene.shutter = self.shutter;
     }
 
-    /// Objects that move have keys after their own transform, and another time moves all that has keys: the text is read anew.
+    /// Another time moves the camera along its keys, and what is animated within an object: the text is read anew.
     pub fn needs_reading(&self, other: &Self, scene: &Scene) -> bool {
-        if self.time_secs() != other.time_secs() {
-            return true;
-        }
-        let changed = Difference::between(self, other).objects;
-        changed
-            .into_iter()
-            .any(|index| scene.objects[index].is_animated())
+        let is_led = self.frame.time_secs.is_none() && !scene.camera_path.is_empty();
+        self.time_secs() != other.time_secs() && (is_led || scene.objects.iter().any(moves_within))
     }
 
     /// The picture's time.
     pub fn time_secs(&self) -> f64 {
-        self.shutter.map_or(0.0, |shutter| shutter.time_secs)
+        let own = self.shutter.map_or(0.0, |shutter| shutter.time_secs);
+        self.frame.time_secs.unwrap_or(own)
     }
+}
+
+/// An animation moves it, its parts or their shapes.
+pub fn moves_within(object: &Object) -> bool {
+    let mut parts = object.instances.iter();
+    parts.any(|part| part.animation.is_some() || part.deforms())
 }
 
 /// Indices of the virtual objects.

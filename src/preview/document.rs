@@ -1,18 +1,20 @@
 //! The scene file's text, edited in place: comments, order and everything that was not changed stay as they are.
 
+mod keyframes;
 mod materials;
 mod stages;
 
 use std::path::Path;
 
-use glam::{DMat4, DQuat, DVec3};
-use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, Value};
+use glam::{DQuat, DVec3};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, TableLike, Value};
 
 use super::composition::{
-    CameraPose, Composition, EnvironmentForm, LensForm, Opening, Placement, Rotation,
+    CameraPose, Composition, EnvironmentForm, FrameLead, LensForm, Opening, Placement, Rotation,
 };
+use super::keyframes::Keys;
 use super::material_form::MaterialForm;
-use crate::scene::{Aperture, Exposure, Scene, Side};
+use crate::scene::{Aperture, Exposure, Lens, ObjectMotion, Scene, Side};
 
 /// Keys that place an object in place of numbers.
 const PLACING_KEYS: [&str; 4] = ["rest_on", "pixel", "size_m", "look_at"];
@@ -34,14 +36,18 @@ impl Document {
 
     /// What the text says, of a scene that was read from it.
     pub fn composition(&self, scene: &Scene) -> Composition {
-        let (mut objects, mut materials) = (Vec::new(), Vec::new());
+        let (mut objects, mut motions, mut materials) = (Vec::new(), Vec::new(), Vec::new());
         for (object, (key, index)) in scene.objects.iter().zip(entries(scene)) {
             let table = self.entry(key, index);
             objects.push(match table {
-                Some(table) if is_placed(table) => Placement::of(object.world_from_object),
+                Some(table) if is_placed(table) => {
+                    let rest = object.motion.as_ref().map(ObjectMotion::rest);
+                    Placement::of(rest.unwrap_or(object.world_from_object))
+                }
                 Some(table) => read_placement(table),
                 None => Placement::IDENTITY,
             });
+            motions.push(table.map_or(Keys::default(), keyframes::read_motion));
             let is_given = table.is_some_and(|table| table.contains_key("material"));
             let first = object.instances.first().filter(|_| is_given);
             materials.push(first.map(|part| MaterialForm::of(&part.material)));
@@ -58,9 +64,14 @@ impl Document {
             max_bounces: scene.settings.max_bounces,
             seed: scene.settings.seed,
             objects,
+            motions,
+            focus_keys: self
+                .table("lens")
+                .map_or(Keys::default(), keyframes::read_focus),
             materials,
             stages: scene.stages.clone(),
             shutter: scene.shutter,
+            frame: FrameLead::default(),
         }
     }
 
@@ -68,29 +79,12 @@ impl Document {
         self.0.get(key)?.as_table_like()
     }
 
-    /// An element of a list of tables, however it is written.
     fn entry(&self, key: &str, index: usize) -> Option<&dyn TableLike> {
-        match self.0.get(key)? {
-            Item::ArrayOfTables(tables) => tables.get(index).map(|table| table as &dyn TableLike),
-            Item::Value(Value::Array(array)) => array
-                .get(index)?
-                .as_inline_table()
-                .map(|table| table as &dyn TableLike),
-            _ => None,
-        }
+        element(self.0.get(key)?, index)
     }
 
     fn entry_mut(&mut self, key: &str, index: usize) -> Option<&mut dyn TableLike> {
-        match self.0.get_mut(key)? {
-            Item::ArrayOfTables(tables) => {
-                (tables.get_mut(index)).map(|table| table as &mut dyn TableLike)
-            }
-            Item::Value(Value::Array(array)) => array
-                .get_mut(index)?
-                .as_inline_table_mut()
-                .map(|table| table as &mut dyn TableLike),
-            _ => None,
-        }
+        element_mut(self.0.get_mut(key)?, index)
     }
 
     fn table_mut(&mut self, key: &str) -> &mut dyn TableLike {
@@ -130,7 +124,8 @@ impl Document {
         };
         LensForm {
             opening,
-            focus_distance_m: lens.focus_distance_m,
+            // The scene's own is that of its time.
+            focus_distance_m: number("focus_distance_m").unwrap_or(Lens::PINHOLE.focus_distance_m),
             aperture: lens.aperture,
             blade_rotation_deg: lens.blade_rotation_deg,
         }
@@ -165,6 +160,10 @@ impl Document {
                 set(self.table_mut("render"), key, i64::from(is));
             }
         }
+        if was.focus_keys != is.focus_keys {
+            let lens = self.table_mut("lens");
+            keyframes::write_focus(lens, &was.focus_keys, &is.focus_keys);
+        }
         self.write_shutter(was.shutter, is.shutter);
         self.write_stages(&was.stages, &is.stages);
         for (index, (key, place)) in entries(scene).enumerate() {
@@ -173,6 +172,9 @@ impl Document {
             };
             if was.objects[index] != is.objects[index] {
                 write_placement(table, &was.objects[index], &is.objects[index]);
+            }
+            if was.motions[index] != is.motions[index] {
+                keyframes::write_motion(table, &was.motions[index], &is.motions[index]);
             }
             if was.materials[index] != is.materials[index] {
                 materials::write(table, was.materials[index], is.materials[index]);
@@ -253,34 +255,15 @@ impl Document {
         let mut table = Table::new();
         table["mesh"] = toml_edit::value(mesh);
         write_placement(&mut table, &Placement::IDENTITY, placement);
-        match self
-            .0
-            .entry("virtual")
-            .or_insert(Item::ArrayOfTables(ArrayOfTables::new()))
-        {
-            Item::ArrayOfTables(tables) => {
-                table.decor_mut().set_prefix("\n");
-                tables.push(table);
-            }
-            Item::Value(Value::Array(array)) => array.push(InlineTable::from_iter(
-                table
-                    .into_iter()
-                    .filter_map(|(key, item)| Some((key, item.into_value().ok()?))),
-            )),
-            _ => {}
-        }
+        let list = (self.0.entry("virtual")).or_insert(Item::ArrayOfTables(ArrayOfTables::new()));
+        let end = length(list);
+        insert_element(list, end, table);
     }
 
     /// Takes a virtual object out, by its number among them.
     pub fn remove_virtual(&mut self, index: usize) {
-        match self.0.get_mut("virtual") {
-            Some(Item::ArrayOfTables(tables)) if index < tables.len() => {
-                tables.remove(index);
-            }
-            Some(Item::Value(Value::Array(array))) if index < array.len() => {
-                array.remove(index);
-            }
-            _ => {}
+        if let Some(list) = self.0.get_mut("virtual") {
+            remove_element(list, index);
         }
     }
 
@@ -300,24 +283,6 @@ pub fn name_of(file: &Path, scene: &Path) -> String {
     let name = file.strip_prefix(&folder).unwrap_or(&file);
     // Slashes are read on every system.
     name.to_string_lossy().replace('\\', "/")
-}
-
-impl Placement {
-    pub const IDENTITY: Self = Self {
-        translation: DVec3::ZERO,
-        rotation: Rotation::EulerDeg(DVec3::ZERO),
-        scale: DVec3::ONE,
-    };
-
-    /// Of a transform without shear.
-    fn of(world_from_object: DMat4) -> Self {
-        let (scale, rotation, translation) = world_from_object.to_scale_rotation_translation();
-        Self {
-            translation,
-            rotation: Rotation::Quaternion(rotation),
-            scale,
-        }
-    }
 }
 
 /// Where the objects of a scene stand in its file: the list, and the number in it.
@@ -384,6 +349,61 @@ fn write_placement(table: &mut dyn TableLike, was: &Placement, is: &Placement) {
             true => set(table, "scale", is.scale.x),
             false => set_vector(table, "scale", is.scale),
         }
+    }
+}
+
+/// Of a list of tables, however it is written.
+fn length(list: &Item) -> usize {
+    match list {
+        Item::ArrayOfTables(tables) => tables.len(),
+        Item::Value(Value::Array(array)) => array.len(),
+        _ => 0,
+    }
+}
+
+fn element(list: &Item, index: usize) -> Option<&dyn TableLike> {
+    match list {
+        Item::ArrayOfTables(tables) => tables.get(index).map(|table| table as &dyn TableLike),
+        Item::Value(Value::Array(array)) => {
+            (array.get(index)?.as_inline_table()).map(|table| table as &dyn TableLike)
+        }
+        _ => None,
+    }
+}
+
+fn element_mut(list: &mut Item, index: usize) -> Option<&mut dyn TableLike> {
+    match list {
+        Item::ArrayOfTables(tables) => {
+            (tables.get_mut(index)).map(|table| table as &mut dyn TableLike)
+        }
+        Item::Value(Value::Array(array)) => {
+            (array.get_mut(index)?.as_inline_table_mut()).map(|table| table as &mut dyn TableLike)
+        }
+        _ => None,
+    }
+}
+
+/// Before the one of that number, or at the end.
+fn insert_element(list: &mut Item, index: usize, mut table: Table) {
+    match list {
+        Item::ArrayOfTables(tables) => {
+            table.decor_mut().set_prefix("\n");
+            tables.insert(index, table);
+        }
+        Item::Value(Value::Array(array)) => array.insert(index, table.into_inline_table()),
+        _ => {}
+    }
+}
+
+fn remove_element(list: &mut Item, index: usize) {
+    match list {
+        Item::ArrayOfTables(tables) if index < tables.len() => {
+            tables.remove(index);
+        }
+        Item::Value(Value::Array(array)) if index < array.len() => {
+            array.remove(index);
+        }
+        _ => {}
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::composition::FrameLead;
 use crate::scene::trajectory::{CameraPath, FrameView, Trajectory, Views};
 use crate::scene::{Camera, Given, Photo, Scene, load_text_with};
 use crate::video::FrameSource;
@@ -75,12 +76,6 @@ impl Frames {
         &self.posed
     }
 
-    /// The trajectory brings the focus, of one frame at least.
-    pub fn pull_focus(&self) -> bool {
-        let mut frames = self.posed.iter();
-        frames.any(|frame| frame.view.focus_distance_m.is_some())
-    }
-
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -126,6 +121,7 @@ impl Frames {
                 shutter.time_secs = time_secs;
             }
             scene.set_time(time_secs);
+            scene.lens = scene.lens_at(time_secs);
         }
         if let Some(focus_distance_m) = view.focus_distance_m {
             scene.lens.focus_distance_m = focus_distance_m;
@@ -137,5 +133,13 @@ impl Frames {
 impl Frame {
     pub fn time_secs(&self) -> Option<f64> {
         self.view.time_secs
+    }
+
+    /// What it brings in place of the scene's own.
+    pub fn lead(&self) -> FrameLead {
+        FrameLead {
+            time_secs: self.view.time_secs,
+            focus_distance_m: self.view.focus_distance_m,
+        }
     }
 }

@@ -127,7 +127,7 @@ impl Geometry {
         let mut nearest = real;
         let world_from_camera = composition.camera.world_from_camera();
         for (index, mesh) in self.objects.iter().enumerate() {
-            let world_from_object = composition.objects[index].world_from_object();
+            let world_from_object = composition.world_from_object(index);
             let inverse = world_from_object.inverse();
             let hit = mesh.closest(
                 inverse.transform_point3(ray.origin),
@@ -192,7 +192,7 @@ impl Geometry {
         if surface.normal.y < LEAST_UPRIGHT {
             return None;
         }
-        let placement = composition.objects[object];
+        let placement = composition.placement(object);
         let lowest = self.lowest_point(object, &placement)?;
         let moved = placement.translation + (surface.point - lowest);
         Some(Placement {
@@ -203,9 +203,10 @@ impl Geometry {
 
     /// How far an object's lowest point is above the real surface under it, metres; negative: below.
     pub fn gap_m(&self, composition: &Composition, object: usize) -> Option<f64> {
-        let lowest = self.lowest_point(object, &composition.objects[object])?;
+        let placement = composition.placement(object);
+        let lowest = self.lowest_point(object, &placement)?;
         let (lo, hi) = self.bounds(object)?;
-        let size = composition.objects[object].scale.abs().max_element() * (hi - lo).length();
+        let size = placement.scale.abs().max_element() * (hi - lo).length();
         Some(lowest.y - self.height_under(lowest, 0.5 * size)?)
     }
 }

@@ -1,5 +1,6 @@
 //! Runs a script on the window's own code, without a display.
 
+mod expectations;
 mod measure;
 
 use std::path::Path;
@@ -9,11 +10,11 @@ use std::time::{Duration, Instant};
 use eframe::egui::{self, Event, Key, Modifiers, MouseWheelUnit, PointerButton, TouchPhase};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
-use super::quantity::decimal;
+use super::composition::Track;
 use super::render_threads::{Level, Shown};
-use super::script::{Expectation, Held, Line, Step};
+use super::script::{Held, Line, Step};
 use super::session::Session;
 use super::still::{Still, StillState};
 use super::window::App;
@@ -83,7 +84,9 @@ pub struct Window {
 }
 
 impl Window {
-    pub fn new(app: App) -> Self {
+    pub fn new(mut app: App) -> Self {
+        // Files come by the steps of a script.
+        app.keep_to_folder();
         let harness = Harness::builder()
             .with_size(SIZE)
             .with_step_dt(1.0 / 60.0)
@@ -288,9 +291,39 @@ impl Window {
                     }
                 });
             }
+            Step::SetKey(name) => {
+                let track = self.track(name)?;
+                self.session_mut().set_key(track);
+            }
+            Step::DeleteKey(name) => {
+                let track = self.track(name)?;
+                if !self.session().has_key(track) {
+                    return Err(format!(
+                        "`{name}` has no key at the present time; expected one; go to its time first"
+                    ));
+                }
+                self.session_mut().delete_key(track);
+            }
+            Step::MoveKey(from, to, name) => {
+                let track = self.track(name)?;
+                if from != to && self.session_mut().shift_key(track, *from, *to) == *from {
+                    return Err(format!(
+                        "`{name}` has no key at {from} s, or has one at {to} s; expected one that can go there; correct the times"
+                    ));
+                }
+                self.session_mut().end_gesture();
+            }
             Step::View(view) => self.session_mut().set_view(*view),
-            Step::Drop(file) => {
-                self.session_mut().take_file(file, None);
+            Step::Place(name, number, value) => {
+                let object = self.object(name)?;
+                self.session_mut().edit("set", |composition| {
+                    let mut placement = composition.placement(object);
+                    number.set(&mut placement, *value);
+                    composition.place(object, placement);
+                });
+            }
+            Step::Drop(file, at) => {
+                self.session_mut().take_file(file, at.map(DVec2::from));
                 self.wait_for_scene()?;
             }
             Step::Frame(number) => {
@@ -330,7 +363,7 @@ impl Window {
         }
         if matches!(
             step,
-            Step::Set(..) | Step::Material(..) | Step::Undo | Step::Redo
+            Step::Set(..) | Step::Material(..) | Step::Place(..) | Step::Undo | Step::Redo
         ) {
             self.session_mut().end_gesture();
         }
@@ -346,71 +379,10 @@ impl Window {
         Ok(())
     }
 
-    fn expect(&mut self, expectation: &Expectation) -> Result<(), String> {
-        let session = self.session();
-        let composition = session.composition().ok_or("no scene is read")?;
-        let holds = match expectation {
-            Expectation::Value(quantity, value, share) => {
-                let is = quantity.of(composition);
-                let close = |is: f64| (is - value).abs() <= share * value.abs();
-                if !is.is_some_and(close) {
-                    let is = is.map_or("nothing".to_owned(), |is| is.to_string());
-                    return Err(format!(
-                        "it is {is}; expected {value}; see the steps before"
-                    ));
-                }
-                true
-            }
-            Expectation::Material(name, number, value) => {
-                let form = composition.materials[self.object(name)?];
-                let is = form.map(|form| decimal(number.of(&form)));
-                if !is.is_some_and(|is| (is - value).abs() <= 1e-5) {
-                    let is = is.map_or("the mesh's own".to_owned(), |is| is.to_string());
-                    return Err(format!(
-                        "it is {is}; expected {value}; see the steps before"
-                    ));
-                }
-                true
-            }
-            Expectation::Position(name, point, within) => {
-                let is = composition.objects[self.object(name)?].translation;
-                if !((is - DVec3::from(*point)).length() <= *within) {
-                    return Err(format!(
-                        "`{name}` is at {is}; expected {point:?} within {within} m; see the steps before"
-                    ));
-                }
-                true
-            }
-            Expectation::Rests(name, within) => {
-                let object = self.object(name)?;
-                let gap = session
-                    .loaded()
-                    .and_then(|l| l.geometry.gap_m(composition, object));
-                let gap = gap.ok_or("there is no real surface under it")?;
-                if !(gap.abs() <= *within) {
-                    return Err(format!(
-                        "`{name}` is {gap} m above the surface; expected at most {within}; see the steps before"
-                    ));
-                }
-                true
-            }
-            Expectation::Frame(number) => {
-                let frames = session.frames().ok_or(NO_FRAMES)?;
-                frames.posed()[session.frame()].number == *number
-            }
-            Expectation::Saved => !session.is_dirty(),
-            Expectation::Unsaved => session.is_dirty(),
-            Expectation::Problem => session.problem().is_some(),
-            Expectation::NoProblem => session.problem().is_none(),
-            Expectation::FileEqualsWindow => self.file_equals_window()?,
-            Expectation::FileDiffersFromWindow => !self.file_equals_window()?,
-        };
-        match holds {
-            true => Ok(()),
-            false => Err(format!(
-                "{expectation:?} does not hold; see the steps before"
-            )),
-        }
+    fn track(&self, name: &str) -> Result<Track, String> {
+        self.session().track(name).ok_or_else(|| {
+            format!("nothing that can have keys is called `{name}`; expected focus, or a virtual object; correct it")
+        })
     }
 
     fn object(&self, name: &str) -> Result<usize, String> {

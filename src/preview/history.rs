@@ -12,6 +12,8 @@ pub struct History<T> {
     future: Vec<T>,
     /// The last change: what it was of, and when.
     last: Option<(String, Instant)>,
+    /// A gesture lasts until it is ended, however slow.
+    is_held: bool,
 }
 
 /// More are forgotten, the oldest first.
@@ -23,6 +25,7 @@ impl<T> Default for History<T> {
             past: Vec::new(),
             future: Vec::new(),
             last: None,
+            is_held: false,
         }
     }
 }
@@ -31,8 +34,9 @@ impl<T: PartialEq> History<T> {
     /// `before` is left for another state by a change of `what`: the name of a slider, or of a gesture.
     pub fn changed(&mut self, before: T, what: &str, now: Instant) {
         self.future.clear();
-        let goes_on = (self.last.as_ref())
-            .is_some_and(|(name, at)| name == what && now.duration_since(*at) < GESTURE);
+        let goes_on = (self.last.as_ref()).is_some_and(|(name, at)| {
+            name == what && (self.is_held || now.duration_since(*at) < GESTURE)
+        });
         if !goes_on {
             if self.past.len() == MAX_STATES {
                 self.past.remove(0);
@@ -42,9 +46,14 @@ impl<T: PartialEq> History<T> {
         self.last = Some((what.to_owned(), now));
     }
 
+    /// Changes of one thing are one step until the gesture ends.
+    pub fn begin_gesture(&mut self) {
+        (self.last, self.is_held) = (None, true);
+    }
+
     /// The next change begins a step of its own.
     pub fn end_gesture(&mut self) {
-        self.last = None;
+        (self.last, self.is_held) = (None, false);
     }
 
     pub fn undo(&mut self, present: T) -> Option<T> {
@@ -94,5 +103,11 @@ mod tests {
         assert_eq!(history.redo(0), Some(3));
         history.changed(3, "scale", start + Duration::from_secs(9));
         assert!(!history.can_redo(), "a change forgets what was undone");
+        history.begin_gesture();
+        for (before, secs) in [(4, 10), (5, 20), (6, 30)] {
+            history.changed(before, "drag", start + Duration::from_secs(secs));
+        }
+        history.end_gesture();
+        assert_eq!(history.undo(7), Some(4), "a slow drag");
     }
 }

@@ -47,10 +47,10 @@ impl MaterialForm {
         }
     }
 
-    /// Every part of the object is made of it, as the reader makes it.
-    pub fn apply(&self, object: &mut Object) {
-        let material = Arc::new(Material {
-            name: object.name.clone(),
+    /// As the reader makes it for an object of that name.
+    pub fn material(&self, name: String) -> Material {
+        Material {
+            name,
             base_color: self.base_color,
             alpha_mode: match self.base_color[3] < 1.0 {
                 true => AlphaMode::Blend,
@@ -70,7 +70,12 @@ impl MaterialForm {
             emissive: self.emissive,
             unlit: self.unlit,
             ..Material::default()
-        });
+        }
+    }
+
+    /// Every part of the object is made of it.
+    pub fn apply(&self, object: &mut Object) {
+        let material = Arc::new(self.material(object.name.clone()));
         for instance in &mut object.instances {
             instance.material = material.clone();
         }

@@ -63,7 +63,7 @@ impl Quantity {
                 Opening::FNumber { f_number, .. } => Some(f_number),
                 Opening::RadiusM(_) => None,
             },
-            Self::FocusDistance => Some(composition.lens.focus_distance_m),
+            Self::FocusDistance => Some(composition.focus_distance_m()),
             Self::Blades => match composition.lens.aperture {
                 Aperture::Blades(blades) => Some(f64::from(blades)),
                 Aperture::Disc | Aperture::Square => Some(0.0),
@@ -85,7 +85,10 @@ impl Quantity {
             Self::CartoonIterations => (stages.cartoon).map(|c| f64::from(c.iterations)),
             Self::CartoonSigmaP => stages.cartoon.map(|cartoon| decimal(cartoon.sigma_p)),
             Self::ExposureTime => composition.shutter.map(|shutter| shutter.exposure_secs),
-            Self::Time => composition.shutter.map(|shutter| shutter.time_secs),
+            Self::Time => {
+                let has_time = composition.shutter.is_some() || composition.has_keys();
+                has_time.then(|| composition.time_secs())
+            }
         }
     }
 
@@ -100,7 +103,7 @@ impl Quantity {
                     *f_number = value;
                 }
             }
-            Self::FocusDistance => composition.lens.focus_distance_m = value,
+            Self::FocusDistance => composition.focus(value),
             Self::Blades => {
                 composition.lens.aperture = match value < 3.0 {
                     true => Aperture::Disc,
@@ -160,8 +163,8 @@ impl Quantity {
                 }
             }
             Self::Time => {
-                if let Some(shutter) = &mut composition.shutter {
-                    shutter.time_secs = value;
+                if self.of(composition).is_some() {
+                    composition.set_time(value);
                 }
             }
         }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::gizmo::Handle;
 use super::material_form::MaterialNumber;
+use super::placement_number::PlacementNumber;
 use super::quantity::Quantity;
 use super::view::View;
 use crate::scene::Choice;
@@ -41,9 +42,16 @@ pub enum Step {
     Set(Quantity, f64),
     /// Of the material that the scene file gives an object.
     Material(String, MaterialNumber, f64),
+    /// Of an object, or `focus`, at the present time.
+    SetKey(String),
+    DeleteKey(String),
+    /// From one time to another, seconds.
+    MoveKey(f64, f64, String),
     View(View),
-    /// As if it were dropped on the window.
-    Drop(PathBuf),
+    /// A number of where an object stands.
+    Place(String, PlacementNumber, f64),
+    /// As if it were dropped on the window, at a position or beside the picture.
+    Drop(PathBuf, Option<[f64; 2]>),
     /// Of the video behind the scene, by its number.
     Frame(u32),
     /// Renders these frames of the saved scene, the end not included, to a folder or film, and waits.
@@ -80,6 +88,8 @@ pub enum Expectation {
     Position(String, [f64; 3], f64),
     /// The object's lowest point touches the real surface under it, within metres.
     Rests(String, f64),
+    /// The times of all keys of an object, or of `focus`, seconds.
+    Keys(String, Vec<f64>),
     /// The frame shown, by its number.
     Frame(u32),
     Saved,
@@ -137,12 +147,24 @@ fn parse_step(line: &str) -> Result<Step, String> {
         ("material", [object, key, value]) => {
             Step::Material((*object).to_owned(), choice(key)?, number(value)?)
         }
+        ("keyframe", ["set", _, ..]) => Step::SetKey(after(rest, 1)),
+        ("keyframe", ["delete", _, ..]) => Step::DeleteKey(after(rest, 1)),
+        ("keyframe", ["move", from, to, _, ..]) => {
+            Step::MoveKey(number(from)?, number(to)?, after(rest, 3))
+        }
         ("view", [view]) => Step::View(choice(view)?),
-        ("drop", [_, ..]) => Step::Drop(PathBuf::from(rest)),
+        ("object", [object, key, value]) => {
+            Step::Place((*object).to_owned(), choice(key)?, number(value)?)
+        }
+        ("drop", [_, .., "at", x, y]) => {
+            let file = rest.rsplitn(4, char::is_whitespace).last();
+            let at = [number(x)?, number(y)?];
+            Step::Drop(PathBuf::from(file.unwrap_or_default().trim_end()), Some(at))
+        }
+        ("drop", [_, ..]) => Step::Drop(PathBuf::from(rest), None),
         ("frame", [number]) => Step::Frame(whole(number)?),
         ("range", [from, to, _, ..]) => {
-            let output = rest.splitn(3, ' ').last().unwrap_or_default();
-            Step::Range(whole(from)?, whole(to)?, PathBuf::from(output))
+            Step::Range(whole(from)?, whole(to)?, PathBuf::from(after(rest, 2)))
         }
         ("undo", []) => Step::Undo,
         ("redo", []) => Step::Redo,
@@ -172,6 +194,10 @@ fn expectation(words: &[&str]) -> Result<Expectation, String> {
         ["material", object, key, value] => {
             Expectation::Material((*object).to_owned(), choice(key)?, number(value)?)
         }
+        ["keyframes", name, times @ ..] => {
+            let times = times.iter().map(|time| number(time));
+            Expectation::Keys((*name).to_owned(), times.collect::<Result<_, _>>()?)
+        }
         ["frame", number] => Expectation::Frame(whole(number)?),
         ["saved"] => Expectation::Saved,
         ["unsaved"] => Expectation::Unsaved,
@@ -193,6 +219,15 @@ fn expectation(words: &[&str]) -> Result<Expectation, String> {
             ));
         }
     })
+}
+
+/// What follows so many words, spaces within it kept.
+fn after(rest: &str, words: usize) -> String {
+    let left = (0..words).fold(rest, |left, _| {
+        let (_, left) = left.split_once(char::is_whitespace).unwrap_or_default();
+        left.trim_start()
+    });
+    left.to_owned()
 }
 
 fn held(words: &[&str]) -> Result<Held, String> {
@@ -244,7 +279,7 @@ mod tests {
 
     #[test]
     fn steps_are_read_with_their_lines() {
-        let text = "# a walk\nclick 12 34.5\n\nset f_number 2.8 # wider\nexpect rests knot within 0.001\nwheel 1 2 -3 shift\n";
+        let text = "# a walk\nclick 12 34.5\n\nset f_number 2.8 # wider\nexpect rests knot within 0.001\nwheel 1 2 -3 shift\nkeyframe move 0 1.5 the ball\ndrop a b.glb at 3 4\nexpect keyframes focus 0 2\n";
         let steps = parse(text).unwrap();
         let of = |number, step| Line { number, step };
         assert_eq!(
@@ -257,6 +292,12 @@ mod tests {
                     Step::Expect(Expectation::Rests("knot".to_owned(), 0.001))
                 ),
                 of(6, Step::Wheel([1.0, 2.0], -3.0, Held::Shift)),
+                of(7, Step::MoveKey(0.0, 1.5, "the ball".to_owned())),
+                of(8, Step::Drop(PathBuf::from("a b.glb"), Some([3.0, 4.0]))),
+                of(
+                    9,
+                    Step::Expect(Expectation::Keys("focus".to_owned(), vec![0.0, 2.0]))
+                ),
             ]
         );
     }
@@ -271,6 +312,8 @@ mod tests {
             ("expect f_number 2 within 1", 1),
             ("size 1 1", 1),
             ("wheel 1 2 3 alt", 1),
+            ("keyframe move 1 ball", 1),
+            ("expect keyframes ball soon", 1),
         ] {
             let (number, problem) = parse(text).unwrap_err();
             assert_eq!(number, line, "{text}");

@@ -4,6 +4,7 @@ use glam::Vec4;
 use rayon::prelude::*;
 
 use crate::film::{Picture, Planes};
+use crate::output::code8;
 use crate::scene::srgb::encode8;
 use crate::scene::{Camera, Choice, Lens, Photo};
 
@@ -123,7 +124,7 @@ pub fn false_colours(
     }
 }
 
-/// A small picture over the whole photograph: what was added is enlarged, the photograph stays sharp.
+/// Codes of a small picture over the whole photograph: what was added is enlarged, the photograph stays sharp.
 ///
 /// `mask` is the small picture's virtual share, `small_photo` the photograph that it was composited over.
 pub fn over_photo(
@@ -132,7 +133,7 @@ pub fn over_photo(
     small_photo: Option<&Photo>,
     photo: Option<&Photo>,
     size: [u32; 2],
-) -> Picture {
+) -> Vec<[u8; 3]> {
     let [width, height] = size;
     // What is added, premultiplied, and how much of the photograph it hides.
     let layer: Vec<Vec4> = (0..small.linear.len())
@@ -155,27 +156,22 @@ pub fn over_photo(
     let columns: Vec<_> = (0..width)
         .map(|x| neighbours((x as f32 + 0.5) * step_x, small_width))
         .collect();
-    let mut linear = vec![[0.0; 3]; width as usize * height as usize];
-    (linear.par_chunks_mut(width as usize).enumerate()).for_each(|(y, row)| {
+    let code = code8(photo);
+    let mut codes = vec![[0; 3]; width as usize * height as usize];
+    (codes.par_chunks_mut(width as usize).enumerate()).for_each(|(y, row)| {
         let (y0, y1, v) = neighbours((y as f32 + 0.5) * step_y, small_height);
         let of_row = |y: usize| &layer[y * small_width..][..small_width];
         let pairs = of_row(y0).iter().zip(of_row(y1));
         let small: Vec<Vec4> = pairs.map(|(a, b)| between(*a, *b, v)).collect();
         for ((x, pixel), &(x0, x1, u)) in row.iter_mut().enumerate().zip(&columns) {
             let [r, g, b, a] = between(small[x0], small[x1], u).to_array();
-            let ic = photo.map_or([0.0; 3], |photo| photo.linear[y * width as usize + x]);
-            *pixel = [
-                r + ic[0] * (1.0 - a),
-                g + ic[1] * (1.0 - a),
-                b + ic[2] * (1.0 - a),
-            ];
+            let at = y * width as usize + x;
+            let ic = photo.map_or([0.0; 3], |photo| photo.linear[at]);
+            let [r, g, b] = [(r, ic[0]), (g, ic[1]), (b, ic[2])].map(|(x, ic)| x + ic * (1.0 - a));
+            *pixel = code(at, [r, g, b]);
         }
     });
-    Picture {
-        width,
-        height,
-        linear,
-    }
+    codes
 }
 
 #[cfg(test)]
@@ -213,7 +209,7 @@ mod tests {
         let codes: Vec<[u8; 3]> = (0..64_u8)
             .map(|i| [i * 3, 255 - i, (i * 31) % 255])
             .collect();
-        let photo = Photo::from_srgb8(8, 8, codes);
+        let photo = Photo::from_srgb8(8, 8, codes.clone());
         let small_photo = Photo::from_srgb8(2, 2, vec![[9, 9, 9]; 4]);
         let mut small = Picture {
             width: 2,
@@ -223,11 +219,11 @@ mod tests {
         let shown = |small: &Picture, mask: &[f32]| {
             over_photo(small, mask, Some(&small_photo), Some(&photo), [8, 8])
         };
-        assert_eq!(shown(&small, &[0.0; 4]).linear, photo.linear);
+        assert_eq!(shown(&small, &[0.0; 4]), codes);
         small.linear[3] = [1.0; 3];
         let covered = shown(&small, &[0.0, 0.0, 0.0, 1.0]);
-        assert_eq!(covered.linear[63], [1.0; 3]);
-        assert_eq!(covered.linear[0], photo.linear[0]);
-        assert_ne!(covered.linear[36], photo.linear[36], "in between");
+        assert_eq!(covered[63], [255; 3]);
+        assert_eq!(covered[0], codes[0]);
+        assert_ne!(covered[36], codes[36], "in between");
     }
 }

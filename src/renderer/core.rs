@@ -40,6 +40,10 @@ pub(super) struct Core {
     pub backdrop_share: Option<f64>,
     /// The picture's time.
     pub time_secs: f64,
+    /// The pilot was not ended by its watcher.
+    pub is_planned: bool,
+    /// In a draft the difference is evaluated at one in this many of the plan's turns.
+    pub thinning: u32,
     /// What a ray in every pixel took the last time.
     pub secs_per_ray: Option<f64>,
 }

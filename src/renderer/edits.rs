@@ -1,11 +1,14 @@
 //! Edits of a scene that is being rendered: each rebuilds what it changes, and the film starts anew.
 
+use std::sync::Arc;
+
 use glam::DMat4;
 
 use super::{RenderError, Renderer};
 use crate::gpu::Changed;
 use crate::pack::traced_shutter;
-use crate::scene::{Exposure, Lens, Light, LightKind, Settings, Side, Stages};
+use crate::packed::FRAME_AOVS;
+use crate::scene::{Exposure, Lens, Light, LightKind, Material, Settings, Side, Stages};
 use crate::work::Watcher;
 
 impl Renderer {
@@ -29,6 +32,62 @@ impl Renderer {
         self.core.film.first_sample = 0;
         self.end_sample = rays_per_pixel;
         self.restart(false, Changed::Plan, watcher)
+    }
+
+    /// What a draft traces: depth, normal and albedo of the first hit or not, and the difference at one in `thinning` of the plan's turns, at least 1,
+    /// with the same expectation and more noise. The film starts anew; false, and it stays, where both are as they were.
+    ///
+    /// # Errors
+    /// As [`Renderer::set_lens`].
+    pub fn set_draft(
+        &mut self,
+        guides: bool,
+        thinning: u32,
+        watcher: &Watcher<'_>,
+    ) -> Result<bool, RenderError> {
+        let flags = &mut self.core.packed.frame.flags;
+        if (*flags & FRAME_AOVS != 0, self.core.thinning) == (guides, thinning) {
+            return Ok(false);
+        }
+        *flags = *flags & !FRAME_AOVS | if guides { FRAME_AOVS } else { 0 };
+        self.core.options.guides = guides;
+        self.core.thinning = thinning;
+        self.restart(false, Changed::Plan, watcher)?;
+        Ok(true)
+    }
+
+    /// Makes a virtual object of one material. Its trees stay; where it was of one that is its own, so do all other materials. A real one costs
+    /// everything.
+    ///
+    /// # Errors
+    /// There is no such object, or as [`Renderer::new`].
+    pub fn set_material(
+        &mut self,
+        object: usize,
+        material: Material,
+        watcher: &Watcher<'_>,
+    ) -> Result<(), RenderError> {
+        let core = &mut self.core;
+        let entry =
+            (core.scene.objects.get_mut(object)).ok_or(RenderError::NoSuchObject(object))?;
+        let material = Arc::new(material);
+        let before: Vec<Arc<Material>> = (entry.instances.iter_mut())
+            .map(|part| std::mem::replace(&mut part.material, material.clone()))
+            .collect();
+        if entry.side == Side::Real {
+            core.photo_light = None;
+            core.pack(watcher)?;
+            return self.restart(true, Changed::All, watcher);
+        }
+        if let Some(own) = before.first() {
+            let parts = core.scene.objects.iter().flat_map(|o| &o.instances);
+            let is_used = parts.clone().any(|part| Arc::ptr_eq(&part.material, own));
+            if !is_used && before.iter().all(|other| Arc::ptr_eq(own, other)) {
+                core.packed.replace_material(own, &material);
+            }
+        }
+        core.pack_moved(watcher)?;
+        self.restart(false, Changed::Virtual, watcher)
     }
 
     /// Another lens. Nothing is rebuilt but the pilot; the film starts anew.

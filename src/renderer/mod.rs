@@ -199,7 +199,8 @@ impl Driver {
 }
 
 impl Renderer {
-    /// Builds acceleration structures and everything else that rendering needs. The watcher hears how far it is; it cannot end it.
+    /// Builds acceleration structures and everything else that rendering needs. The watcher hears how far it is; it can end the pilot alone, which
+    /// then comes before the first sample.
     ///
     /// # Errors
     /// The scene does not fit the packed form or the adapter, or `gpu` was asked for where there is none.
@@ -241,6 +242,8 @@ impl Renderer {
                 coarse_photo: None,
                 photo_light: None,
                 backdrop_share: None,
+                is_planned: false,
+                thinning: 1,
                 secs_per_ray: None,
             },
             driver: Driver::Still,
@@ -263,7 +266,7 @@ impl Renderer {
     /// # Errors
     /// Only what the GPU refuses for good; a device that is lost is replaced by the CPU.
     pub fn advance(&mut self, budget: Budget, watcher: &Watcher<'_>) -> Result<(), RenderError> {
-        if self.stated.is_some() || self.core.nothing_to_trace() {
+        if self.stated.is_some() || !self.plan(watcher)? || self.core.nothing_to_trace() {
             return Ok(());
         }
         let stopwatch = Stopwatch::start();

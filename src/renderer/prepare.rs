@@ -176,6 +176,15 @@ impl Renderer {
         }
     }
 
+    /// Runs the pilot again where its watcher ended it; false if this one does too.
+    pub(super) fn plan(&mut self, watcher: &Watcher<'_>) -> Result<bool, RenderError> {
+        if !self.core.is_planned {
+            self.look_ahead(watcher);
+            self.core.backend.update(&self.core.packed, Changed::Plan)?;
+        }
+        Ok(self.core.is_planned)
+    }
+
     /// Runs the pilot and begins the film that follows its plan.
     pub(super) fn look_ahead(&mut self, watcher: &Watcher<'_>) {
         let stopwatch = Stopwatch::start();
@@ -195,7 +204,11 @@ impl Renderer {
         core.packed.set_backdrop(photo, backdrop);
         let begun = core.places.end(Place::Backdrop, begun);
         cpu::pilot(&mut core.packed, core.lens_grid.as_ref(), &meter);
+        core.is_planned = !meter.is_cancelled();
         without.apply_to_pixels(&mut core.packed.pixels);
+        for pixel in &mut core.packed.pixels {
+            pixel.difference_period *= core.thinning;
+        }
         let begun = core.places.end(Place::Pilot, begun);
         let photons = core.packed.photons_per_ray > 0;
         let note = core.packed.black_shadows(photons);

@@ -1,4 +1,4 @@
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use super::*;
 use crate::pack::{test_mesh, test_scene};
@@ -142,4 +142,98 @@ fn an_edited_draft_is_a_draft_of_the_edited_scene() {
     let after = shown(&mut edited);
     assert_eq!(after, shown(&mut new));
     assert_ne!(after, before, "control");
+}
+
+/// Each bit of the film's sums.
+fn bits(renderer: &Renderer) -> Vec<u32> {
+    let picture = renderer.picture();
+    let values = picture.linear.as_flattened().iter();
+    values.map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn a_material_is_replaced_as_if_it_had_always_been_there() {
+    let nobody = Watcher::none();
+    let green = |green: f32| Material {
+        base_color: [0.1, green, 0.1, 1.0],
+        ..Material::default()
+    };
+    let with = |green_of_square: f32| {
+        let mut scene = scene_with_a_photo(false);
+        let material = Arc::new(green(green_of_square));
+        for part in &mut scene.objects[1].instances {
+            part.material = material.clone();
+        }
+        Renderer::new(scene, RendererOptions::default(), &nobody).expect("fits")
+    };
+    let mut edited = with(0.2);
+    let count = edited.packed().materials.len();
+    for green_now in [0.5, 0.9] {
+        edited
+            .set_material(1, green(green_now), &nobody)
+            .expect("fits");
+    }
+    assert_eq!(
+        edited.packed().materials.len(),
+        count,
+        "in the place of the one before"
+    );
+    let mut anew = with(0.9);
+    for renderer in [&mut edited, &mut anew] {
+        renderer
+            .advance(Budget::Complete, &nobody)
+            .expect("renders");
+    }
+    assert_eq!(bits(&edited), bits(&anew));
+    let mut other = with(0.5);
+    other.advance(Budget::Complete, &nobody).expect("renders");
+    assert_ne!(bits(&other), bits(&anew), "control");
+    let missing = edited.set_material(7, green(0.5), &nobody);
+    assert!(matches!(missing, Err(RenderError::NoSuchObject(7))));
+}
+
+#[test]
+fn a_pilot_that_was_ended_is_run_again_before_the_first_sample() {
+    let scene = || {
+        let mut scene = scene_with_a_photo(false);
+        scene.settings.rays_per_pixel = 16;
+        scene
+    };
+    let nobody = Watcher::none();
+    let ended = || true;
+    let mut cut = Renderer::new(
+        scene(),
+        RendererOptions::default(),
+        &Watcher::none().cancelled_by(&ended),
+    )
+    .expect("fits");
+    assert!(!cut.core.is_planned);
+    cut.advance(Budget::Complete, &nobody).expect("renders");
+    let mut whole = Renderer::new(scene(), RendererOptions::default(), &nobody).expect("fits");
+    assert!(whole.core.is_planned, "control");
+    whole.advance(Budget::Complete, &nobody).expect("renders");
+    assert_eq!(whole.samples(), 16);
+    assert_eq!(bits(&cut), bits(&whole));
+}
+
+#[test]
+fn a_thinned_draft_takes_fewer_rays() {
+    let nobody = Watcher::none();
+    let options = RendererOptions {
+        guides: true,
+        draft: true,
+        ..RendererOptions::default()
+    };
+    let rays = |guides: bool, thinning: u32| {
+        let mut renderer =
+            Renderer::new(scene_with_a_photo(false), options, &nobody).expect("fits");
+        renderer.set_draft(guides, thinning, &nobody).expect("fits");
+        renderer
+            .advance(Budget::Complete, &nobody)
+            .expect("renders");
+        renderer.rays().traced()
+    };
+    let [whole, without_guides, thinned] = [rays(true, 1), rays(false, 1), rays(false, 2)];
+    assert!(without_guides <= whole, "{without_guides} of {whole}");
+    assert!(thinned < without_guides, "{thinned} of {without_guides}");
 }

@@ -50,6 +50,7 @@ const LENS_KEYS: &[&str] = &[
     "focus_distance_m",
     "aperture",
     "blade_rotation_deg",
+    "motion",
 ];
 
 /// `[camera]`, its intrinsics those `given` by the caller, if it brings any; then the table may be absent.

@@ -8,6 +8,7 @@ use super::camera::{read_camera_table, read_lens};
 use super::check::read_allowed;
 use super::environment::read_environment;
 use super::error::{Result, SceneError, Source};
+use super::focus_path::read_focus_path;
 use super::light::read_lights;
 use super::object::ObjectReader;
 use super::photo::read_photo;
@@ -140,6 +141,7 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
             "leave out [lens], or crop the photograph",
         )
     })?;
+    let focus_path = read_focus_path(&root, &lens)?;
     let environment = read_environment(&root, &mut warnings)?;
     let mut lights = read_lights(&root)?;
     let reader = ObjectReader::new(photo.is_some(), &camera, &mut warnings);
@@ -166,6 +168,7 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
         objects,
         shutter,
         camera_path,
+        focus_path,
         settings,
         inputs,
         stages,
@@ -173,6 +176,7 @@ pub(super) fn read_scene(source: &Source, given: Given) -> Result<Scene> {
         warnings,
     };
     scene.set_time(time_secs);
+    scene.lens = scene.lens_at(time_secs);
     Ok(scene)
 }
 

@@ -12,6 +12,7 @@ mod environment;
 pub(crate) mod error;
 mod file;
 pub(crate) mod fingerprint;
+mod focus_path;
 pub mod gltf;
 mod light;
 mod material;
@@ -41,6 +42,7 @@ pub use crate::stages::settings::*;
 pub use error::SceneError;
 pub use file::{Given, load, load_text, load_text_with, load_with};
 pub use fingerprint::{Content, ContentHash};
+pub use focus_path::FocusPath;
 pub use material::Material;
 pub use photo::{LayerPicture, read_codes, read_coverage, read_layer};
 pub use reader::Choice;
@@ -79,6 +81,8 @@ pub struct Scene {
     pub shutter: Option<Shutter>,
     /// The camera's way in time; empty: it stands still.
     pub camera_path: trajectory::CameraPath,
+    /// Where the lens is focused in time; empty: it stays.
+    pub focus_path: FocusPath,
     pub settings: Settings,
     /// The files that the scene is made of, its own included.
     pub inputs: Vec<PathBuf>,

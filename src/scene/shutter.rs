@@ -28,6 +28,11 @@ impl Shutter {
     /// Most instants over the exposure.
     pub const MAX_SAMPLES: u32 = 4096;
 
+    /// Light is gathered for some time; else everything stands still.
+    pub fn is_open(&self) -> bool {
+        self.exposure_secs + self.readout_secs > 0.0
+    }
+
     /// When the first row opens and the last one closes, seconds.
     pub fn interval_secs(&self) -> (f64, f64) {
         let half = 0.5 * (self.exposure_secs + self.readout_secs);
@@ -71,6 +76,11 @@ impl ObjectMotion {
     pub fn new(rest: DMat4, mut keys: Vec<MotionKey>) -> Self {
         keys.sort_by(|a, b| a.time_secs.total_cmp(&b.time_secs));
         Self { rest, keys }
+    }
+
+    /// World-from-object without the motion.
+    pub fn rest(&self) -> DMat4 {
+        self.rest
     }
 
     /// From the first key to the last.
@@ -189,6 +199,6 @@ pub(super) fn read_object_motion(table: &Table, rest: DMat4) -> Result<Option<Ob
     Ok((!keys.is_empty()).then(|| ObjectMotion::new(rest, keys)))
 }
 
-fn read_time(table: &Table) -> Result<f64> {
+pub(super) fn read_time(table: &Table) -> Result<f64> {
     table.required("time_secs", "time_secs = 0.04", Node::finite)
 }

@@ -17,7 +17,7 @@ use crate::renderer::{
     RendererOptions, Watcher,
 };
 use crate::scene::trajectory::{FrameName, FrameView};
-use crate::scene::{Camera, Lens, MotionBlurMethod, Scene};
+use crate::scene::{Camera, FocusPath, Lens, MotionBlurMethod, Scene};
 use crate::stages::{Finished, GpuStages, finish, finish_in_layers};
 use crate::video::{FrameSink, Header, Pixels, SinkPlan, Taken, VideoFrame};
 
@@ -131,6 +131,7 @@ struct Started {
     /// Frames are turned as their tags say.
     upright: bool,
     lens: Lens,
+    focus_path: FocusPath,
     /// The scene file's own, where nobody else brings intrinsics.
     camera: Camera,
     /// Not before the first posed frame.
@@ -231,6 +232,7 @@ impl Sequence<'_> {
                 name.number,
             )
             .or(view.focus_distance_m)
+            .or(started.focus_path.distance_m(time_secs))
             .unwrap_or(started.lens.focus_distance_m),
             ..started.lens
         };
@@ -439,6 +441,7 @@ impl Sequence<'_> {
             scene_hash: scene.fingerprint(),
             size,
             lens: scene.lens,
+            focus_path: scene.focus_path.clone(),
             upright: scene.settings.upright_photo,
             camera: scene.camera.clone(),
             seed: scene.settings.seed,

@@ -194,6 +194,11 @@ impl<'a> Meter<'a> {
         }
     }
 
+    /// What is being done is not waited for any more.
+    pub fn is_cancelled(&self) -> bool {
+        self.watcher.is_cancelled()
+    }
+
     /// So many more are done.
     pub fn add(&self, count: u64) {
         let done = count + self.done.fetch_add(count, Ordering::Relaxed);

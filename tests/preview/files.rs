@@ -219,3 +219,37 @@ fn a_still_is_rendered_beside_and_never_over_an_input() {
     assert!(window.session().problem().is_some());
     assert_eq!(folder.read("scene.toml"), SCENE);
 }
+
+#[test]
+fn a_scene_that_cannot_be_read_does_not_take_the_place_of_a_good_one() {
+    let folder = folder();
+    let mut window = window(&folder);
+    window
+        .step(
+            &parse("set f_number 4").unwrap().remove(0).step,
+            &mut |_| (),
+        )
+        .unwrap();
+    folder.write("broken.toml", "[camera");
+    folder.write(
+        "other.toml",
+        SCENE.replace("rays_per_pixel = 4", "rays_per_pixel = 3"),
+    );
+    for file in ["broken.toml", "nowhere.toml"] {
+        window.session_mut().take_file(&folder.path(file), None);
+        assert!(soon(&mut window, |session| session.problem().is_some()));
+        let session = window.session();
+        assert!(session.problem().unwrap().contains(file));
+        assert_eq!(session.path(), folder.path("scene.toml"));
+        assert_eq!(rays(session), 4);
+        assert!(session.is_dirty() && session.can_undo(), "the edit stays");
+    }
+    window
+        .session_mut()
+        .take_file(&folder.path("other.toml"), None);
+    assert!(soon(&mut window, |session| rays(session) == 3), "control");
+    let session = window.session();
+    assert_eq!(session.path(), folder.path("other.toml"));
+    assert!(!session.is_dirty() && !session.can_undo());
+    assert_eq!(session.problem(), None);
+}

@@ -1,8 +1,10 @@
 //! `mixray preview` without a display.
 
 mod composing;
+mod desk;
 mod files;
 mod gizmo;
+mod keyframes;
 mod layout;
 mod random_walk;
 mod real_window;

@@ -63,11 +63,19 @@ pub struct BlockMoments {
 
 /// Takes samples in some pixels of every square, with what they share; far from virtual geometry in every second square, as on a chessboard.
 /// `done` hears of each block. `scene.pixels` must ask for every sample's difference.
-pub fn measure(scene: &PackedScene, blocks: &Blocks, done: impl Fn() + Sync) -> Vec<BlockMoments> {
+pub fn measure(
+    scene: &PackedScene,
+    blocks: &Blocks,
+    is_cancelled: impl Fn() -> bool + Sync,
+    done: impl Fn() + Sync,
+) -> Vec<BlockMoments> {
     let parts: Vec<_> = (blocks.squares(BLOCK_SIDE as usize))
         .into_par_iter()
         .map_init(Batch::default, |batch, square| {
             let mut moments = BTreeMap::new();
+            if is_cancelled() {
+                return moments;
+            }
             measure_square(scene, blocks, &square, batch, &mut moments);
             moments.iter().for_each(|_| done());
             moments

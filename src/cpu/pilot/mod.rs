@@ -51,7 +51,7 @@ pub fn pilot_steps(frame: &Frame) -> u64 {
     (width * height) as u64 + STEPS_OF_A_BLOCK * Blocks::of(width, height).count() as u64
 }
 
-/// Fills `scene.pixels`. The same for every seed, sample range and backend. `grid`: the lens's, where there is one, which spares undistorting.
+/// Fills `scene.pixels`. The same for every seed, sample range and backend; ended by the meter's watcher, it is no plan to render by. `grid`: the lens's, where there is one, which spares undistorting.
 pub fn pilot(scene: &mut PackedScene, grid: Option<&LensGrid>, meter: &Meter<'_>) {
     let (width, height) = (scene.frame.width as usize, scene.frame.height as usize);
     let nothing_virtual = scene.frame.sphere_count == 0
@@ -210,7 +210,16 @@ fn measure(scene: &mut PackedScene, blocks: &Blocks, flags: &[u32], meter: &Mete
         .iter()
         .map(|flags| PixelInfo::uniform(flags | shares))
         .collect();
-    let samples = measurement::measure(scene, blocks, || meter.add(STEPS_OF_A_BLOCK));
+    let is_cancelled = || meter.is_cancelled();
+    let samples = measurement::measure(scene, blocks, is_cancelled, || meter.add(STEPS_OF_A_BLOCK));
+    if is_cancelled() {
+        scene.frame = frame;
+        return Measured {
+            samples,
+            highlights: vec![0.0; blocks.count()],
+            photon: None,
+        };
+    }
     let photon = photons_traced(&scene.frame).then(|| photons::plan::measure(scene));
     let highlights = if scene.frame.photon_sphere_count > 0 {
         highlights::highlights(scene, blocks)

@@ -1,5 +1,6 @@
 use super::*;
-use crate::scene::load_text;
+use crate::preview::composition::Track;
+use crate::scene::{Shutter, load_text};
 
 const TEXT: &str = "\
 # my desk
@@ -100,4 +101,145 @@ fn files_are_named_as_the_scene_sees_them() {
     let name = |file: &str| name_of(Path::new(file), Path::new("/a/scene.toml"));
     assert_eq!(name("/a/b/c.glb"), "b/c.glb");
     assert_eq!(name("/d/c.glb"), "/d/c.glb");
+}
+
+const KEYED: &str = "\
+[camera]
+width = 32
+height = 24
+vertical_fov_deg = 40
+
+[lens]
+focus_distance_m = 3
+motion = [{ time_secs = 0, focus_distance_m = 1 }] # one line
+
+[[virtual]] # the ball
+shape = \"sphere\"
+scale = 0.5
+
+# it comes
+[[virtual.motion]]
+time_secs = 2 # late
+translation = [1, 0, -3] # over there
+
+[[virtual.motion]]
+time_secs = 0
+translation = [0, 0, -3]
+
+[[virtual]]
+shape = \"sphere\"
+translation = [0, 1, -3] # at rest
+
+[render]
+rays_per_pixel = 4
+";
+
+#[test]
+fn keys_are_written_with_comments_and_order_kept() {
+    let path = Path::new("scene.toml");
+    let scene = load_text(path, KEYED).unwrap();
+    let document = Document::parse(KEYED).unwrap();
+    let was = document.composition(&scene);
+    assert_eq!(was.motions[0].times_secs(), [0.0, 2.0]);
+    assert_eq!(was.focus_distance_m(), 1.0, "by its key");
+    let written = |is: &Composition| {
+        let mut document = document.clone();
+        document.write(&was, is, &scene);
+        document.text()
+    };
+    assert_eq!(written(&was), KEYED, "nothing changed");
+
+    let mut is = was.clone();
+    assert!(is.shift_key(Track::Object(0), 2.0, 1.5));
+    is.shutter = Some(Shutter {
+        exposure_secs: 0.0,
+        readout_secs: 0.0,
+        samples: None,
+        time_secs: 1.0,
+    });
+    is.set_key(Track::Object(1));
+    is.place(
+        0,
+        Placement {
+            translation: DVec3::new(0.5, 0.25, -3.0),
+            ..is.placement(0)
+        },
+    );
+    is.focus(2.0);
+    let text = written(&is);
+    for kept in [
+        "# it comes\n[[virtual.motion]]\ntime_secs = 1.5 # late\n",
+        "# over there",
+        "# one line",
+    ] {
+        assert!(text.contains(kept), "{kept}:\n{text}");
+    }
+    let order: Vec<&str> = text.lines().filter(|line| line.starts_with("[[")).collect();
+    let virtual_motion = "[[virtual.motion]]";
+    assert_eq!(
+        order,
+        [
+            "[[virtual]] # the ball",
+            virtual_motion,
+            virtual_motion,
+            virtual_motion,
+            "[[virtual]]",
+            virtual_motion
+        ]
+    );
+    let again = load_text(path, &text).unwrap();
+    let read = Document::parse(&text).unwrap().composition(&again);
+    assert_eq!(read.motions[0].times_secs(), [0.0, 1.0, 1.5]);
+    assert_eq!(read.motions[1].times_secs(), [1.0]);
+    let mut edited = scene.clone();
+    is.apply(&mut edited);
+    for (index, (a, b)) in again.objects.iter().zip(&edited.objects).enumerate() {
+        assert_eq!(a.world_from_object, b.world_from_object, "object {index}");
+        assert_eq!(a.motion, b.motion, "object {index}");
+    }
+    assert_eq!(
+        (again.lens, again.focus_path),
+        (edited.lens, edited.focus_path)
+    );
+
+    // The last key leaves its object where it had it.
+    is.delete_key(Track::Object(1));
+    assert_eq!(is.objects[1], was.objects[1]);
+    let mut without = was.clone();
+    without.motions[0] = Keys::default();
+    let text = written(&without);
+    assert!(
+        !text.contains(virtual_motion) && text.contains("# at rest"),
+        "{text}"
+    );
+}
+
+#[test]
+fn an_object_turns_about_itself_between_two_keys() {
+    let scene = load_text(Path::new("scene.toml"), TEXT).unwrap();
+    let mut composition = Document::parse(TEXT).unwrap().composition(&scene);
+    let at = |composition: &mut Composition, time_secs: f64| {
+        composition.shutter = Some(Shutter {
+            exposure_secs: 0.0,
+            readout_secs: 0.0,
+            samples: None,
+            time_secs,
+        });
+    };
+    let before = composition.placement(0);
+    composition.set_key(Track::Object(0));
+    assert_eq!(composition.placement(0), before);
+    at(&mut composition, 1.0);
+    let turned = Placement {
+        rotation: Rotation::EulerDeg(DVec3::new(0.0, 150.0, 0.0)),
+        ..before
+    };
+    composition.place(0, turned);
+    at(&mut composition, 0.5);
+    let between = composition.placement(0);
+    assert_eq!(between.translation, before.translation);
+    assert_eq!(
+        between.rotation,
+        Rotation::EulerDeg(DVec3::new(0.0, 90.0, 0.0))
+    );
 }

@@ -1,13 +1,14 @@
 //! A renderer at what is wanted: built anew where it must be, else edited.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::{Level, Wanted};
 use crate::preview::composition::{Composition, Difference};
 use crate::renderer::{
     Filter, FrameEdit, RenderError, Renderer, RendererOptions, Skip, Watcher, Without,
 };
-use crate::scene::{BackendChoice, Exposure, Scene};
+use crate::scene::{BackendChoice, Exposure, Object, Scene};
 
 /// The coarse picture's sides are the whole one's divided by this.
 const COARSE_DIVISOR: u32 = 4;
@@ -23,6 +24,29 @@ pub(super) struct Current {
     scene: Arc<Scene>,
     composition: Composition,
     has_real: bool,
+    /// Of the coarse picture's difference, now and from the next edit on.
+    thinning: u32,
+    next_thinning: u32,
+}
+
+/// With this the coarse picture takes about two thirds of the time.
+const THIN: u32 = 2;
+
+impl Current {
+    /// Thins the difference where a coarse picture took longer than a frame, until one takes less than half of it.
+    pub fn pace(&mut self, took: Duration, frame_time: Duration) {
+        if took > frame_time {
+            self.next_thinning = THIN;
+        } else if took < frame_time / 2 {
+            self.next_thinning = 1;
+        }
+    }
+
+    /// Traces what the view shows; true if the film starts anew.
+    fn draft(&mut self, wanted: &Wanted, watcher: &Watcher<'_>) -> Result<bool, RenderError> {
+        let guides = wanted.view.needs_planes();
+        self.renderer.set_draft(guides, self.thinning, watcher)
+    }
 }
 
 /// Brings the renderer to what is wanted; what it was that changed, if the picture began anew.
@@ -36,12 +60,16 @@ pub(super) fn take_up(
     let fits = |current: &Current| {
         Arc::ptr_eq(&current.scene, &wanted.scene)
             && current.has_real == has_real
-            && !Difference::between(&current.composition, &wanted.composition).built
+            && is_edit(level, &current.composition, wanted)
     };
     if let Some(current) = current.as_mut().filter(|current| fits(current)) {
         let difference = Difference::between(&current.composition, &wanted.composition);
+        if !difference.is_none() {
+            current.thinning = current.next_thinning;
+        }
+        let begins = level == Level::Coarse && current.draft(wanted, watcher)?;
         if difference.is_none() {
-            return Ok(None);
+            return Ok(begins.then_some("view"));
         }
         edit(&mut current.renderer, level, &difference, wanted, watcher)?;
         current.composition = wanted.composition.clone();
@@ -66,14 +94,34 @@ pub(super) fn take_up(
         ..RendererOptions::default()
     };
     // The memory of the scene before is free first.
-    *current = None;
-    *current = Some(Current {
+    let thinning = current.take().map_or(1, |before| before.next_thinning);
+    let new = current.insert(Current {
         renderer: Renderer::new(scene, options, watcher)?,
         scene: wanted.scene.clone(),
         composition: wanted.composition.clone(),
         has_real,
+        thinning,
+        next_thinning: thinning,
     });
+    if level == Level::Coarse {
+        new.draft(wanted, watcher)?;
+    }
     Ok(Some("scene"))
+}
+
+/// The renderer takes the difference up without being built anew.
+fn is_edit(level: Level, from: &Composition, wanted: &Wanted) -> bool {
+    let to = &wanted.composition;
+    let difference = Difference::between(from, to);
+    // Such an object rests once it was edited, which is told from one that moves by an open shutter, and by the last bits.
+    let is_moving = |object: &usize| wanted.scene.objects[*object].is_animated();
+    let moves = difference.motion || difference.objects.iter().any(is_moving);
+    let rests = level == Level::Coarse && !to.shutter.is_some_and(|shutter| shutter.is_open());
+    // With the mesh's own materials, and without them, the scene is another.
+    let is_own =
+        |object: &usize| from.materials[*object].is_none() || to.materials[*object].is_none();
+    let remade = difference.materials.iter().any(is_own);
+    !difference.built && !remade && (rests || !moves)
 }
 
 fn edit(
@@ -85,8 +133,14 @@ fn edit(
 ) -> Result<(), RenderError> {
     let to = &wanted.composition;
     for object in &difference.objects {
-        let placement = to.objects[*object].world_from_object();
+        let placement = to.world_from_object(*object);
         renderer.set_object_transform(*object, placement, watcher)?;
+    }
+    for object in &difference.materials {
+        if let Some(form) = to.materials[*object] {
+            let name = renderer.scene().objects[*object].name.clone();
+            renderer.set_material(*object, form.material(name), watcher)?;
+        }
     }
     if difference.environment
         && let Some(form) = to.environment
@@ -106,7 +160,7 @@ fn edit(
         set_camera(renderer, level, to, watcher)?;
     }
     if difference.lens {
-        renderer.set_lens(to.lens.lens(), watcher)?;
+        renderer.set_lens(to.lens(), watcher)?;
     }
     Ok(())
 }
@@ -128,7 +182,7 @@ fn set_camera(
     let edit = FrameEdit {
         photo: None,
         camera,
-        lens: to.lens.lens(),
+        lens: to.lens(),
         camera_path: scene.camera_path.clone(),
         time_secs: scene.shutter.map_or(0.0, |shutter| shutter.time_secs),
         seed: to.seed,
@@ -144,8 +198,21 @@ fn shrink(scene: &mut Scene) {
     let (width, height) = (scene.camera.width, scene.camera.height);
     let photo = scene.photo.as_ref();
     scene.photo = photo.map(|photo| photo.averaged(width, height));
+    if !scene.shutter.is_some_and(|shutter| shutter.is_open()) {
+        rest(&mut scene.objects);
+    }
     scene.settings.rays_per_pixel = COARSE_RAYS;
     scene.settings.clamp_indirect = scene.settings.clamp_indirect.min(COARSE_CLAMP);
     // It is small, and a second device would have to be opened for it.
     scene.settings.backend = BackendChoice::Cpu;
+}
+
+/// What moves stays where it is, and is edited like all else.
+fn rest(objects: &mut [Object]) {
+    for object in objects {
+        object.motion = None;
+        for part in &mut object.instances {
+            (part.animation, part.deformation) = (None, None);
+        }
+    }
 }

@@ -22,9 +22,8 @@ pub(super) fn coarse_picture(renderer: &Renderer, wanted: &Wanted) -> Shown {
     let size = [camera.width, camera.height];
     let photo = wanted.scene.photo.as_ref();
     let small_photo = renderer.scene().photo.as_ref();
-    let picture = over_photo(&small, &mask, small_photo, photo, size);
     let (codes, [width, height]) = match wanted.view {
-        View::Picture => (picture_codes8(&picture, photo), size),
+        View::Picture => (over_photo(&small, &mask, small_photo, photo, size), size),
         View::Photograph => (photo_codes(photo, size), size),
         view => {
             let scene = renderer.scene();
@@ -38,7 +37,7 @@ pub(super) fn coarse_picture(renderer: &Renderer, wanted: &Wanted) -> Shown {
         wanted,
         codes,
         [width, height],
-        picture,
+        small,
     )
 }
 

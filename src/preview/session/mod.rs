@@ -2,6 +2,7 @@
 //!
 //! Nothing here waits: files are read on a thread of their own, pictures come from [`RenderThreads`].
 
+mod keyframes;
 mod reading;
 mod rewriting;
 mod timeline;
@@ -24,7 +25,7 @@ use super::still::Still;
 use super::view::View;
 use super::watch::Watch;
 use crate::output::write_text;
-use crate::scene::{Object, Scene, Stages};
+use crate::scene::{Scene, Stages};
 use reading::Reading;
 pub use rewriting::TAKEN_ENDINGS;
 use unsaved::AUTOSAVE_EVERY;
@@ -44,38 +45,6 @@ pub struct Loaded {
     /// As the text has it.
     base: Composition,
     text: Arc<str>,
-}
-
-impl Loaded {
-    /// Something has a way in time: the camera, or an object.
-    pub fn moves(&self) -> bool {
-        !self.scene.camera_path.is_empty() || self.scene.objects.iter().any(Object::is_animated)
-    }
-
-    /// From the first of its keys to the last; a second where it has none.
-    pub fn span_secs(&self) -> (f64, f64) {
-        let path = &self.scene.camera_path;
-        let ends = [
-            path.key_after(f64::NEG_INFINITY),
-            path.key_before(f64::INFINITY),
-        ];
-        let of_camera = ends.into_iter().flatten().map(|(time_secs, _)| time_secs);
-        let objects = self.scene.objects.iter();
-        let of_objects = objects
-            .clone()
-            .filter_map(|o| o.motion.as_ref()?.span_secs());
-        let parts = objects.flat_map(|object| &object.instances);
-        let of_parts =
-            parts.filter_map(|part| Some(part.animation.as_ref()?.animation.duration_secs));
-        let times = of_camera
-            .chain(of_objects.flat_map(|(first, last)| [first, last]))
-            .chain(of_parts.flat_map(|duration_secs| [0.0, duration_secs]));
-        let span = times.fold(None, |span: Option<(f64, f64)>, time| {
-            let (first, last) = span.unwrap_or((time, time));
-            Some((first.min(time), last.max(time)))
-        });
-        span.unwrap_or((0.0, 1.0))
-    }
 }
 
 pub struct Session {
@@ -146,19 +115,6 @@ impl Session {
         session.recovered = std::fs::read_to_string(session.autosave_path()).ok();
         session.read_disk();
         Ok(session)
-    }
-
-    /// Another scene file in its place; edits of this one are dropped.
-    pub fn switch(&mut self, path: &Path) {
-        self.discard_autosave();
-        self.path = path.to_path_buf();
-        (self.loaded, self.present, self.saved) = (None, None, None);
-        (self.watch, self.reading, self.problem) = (None, None, None);
-        self.has_conflict = false;
-        self.frames = None;
-        self.history.clear();
-        self.recovered = std::fs::read_to_string(self.autosave_path()).ok();
-        self.read_disk();
     }
 
     pub fn path(&self) -> &Path {
@@ -273,6 +229,11 @@ impl Session {
         self.show_from(&before.composition);
     }
 
+    /// Edits of one thing are undone together until [`Session::end_gesture`].
+    pub fn begin_gesture(&mut self) {
+        self.history.begin_gesture();
+    }
+
     /// The next edit is undone by itself.
     pub fn end_gesture(&mut self) {
         self.history.end_gesture();
@@ -377,7 +338,7 @@ impl Session {
             self.end_gesture();
             self.edit("focus", |composition| {
                 let least = composition.lens.least_focus_m();
-                composition.lens.focus_distance_m = rounded(pick.depth_m, 1e-4).max(least);
+                composition.focus(rounded(pick.depth_m, 1e-4).max(least));
             });
             self.end_gesture();
         }
@@ -391,9 +352,7 @@ impl Session {
         let camera = &loaded.scene.camera;
         let rested = (loaded.geometry).rest_at(camera, composition, object, pixel);
         if let Some(placement) = rested {
-            self.edit("drag", |composition| {
-                composition.objects[object] = placement
-            });
+            self.edit("drag", |composition| composition.place(object, placement));
         }
     }
 

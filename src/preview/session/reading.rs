@@ -23,6 +23,8 @@ pub(super) struct Reading {
     pub(super) change: Option<&'static str>,
     /// It is what the disk holds.
     pub(super) is_saved: bool,
+    /// Another scene file, whose place the session takes once it is read.
+    pub(super) other: Option<PathBuf>,
 }
 
 impl Session {
@@ -39,6 +41,9 @@ impl Session {
             }
         };
         self.problem = None;
+        if let Some(path) = reading.other {
+            self.leave_for(path, &loaded.text);
+        }
         let fits = |composition: &Composition| {
             composition.objects.len() == loaded.base.objects.len()
                 && composition.environment.is_some() == loaded.base.environment.is_some()
@@ -105,6 +110,28 @@ impl Session {
         }
     }
 
+    /// Another scene file in the place of this one, whose edits are dropped; one that cannot be read leaves all as it is.
+    pub fn switch(&mut self, path: &Path) {
+        match std::fs::read(path) {
+            Ok(bytes) => {
+                let text: Arc<str> = Arc::from(String::from_utf8_lossy(&bytes));
+                self.begin_reading(text, Some(path.to_path_buf()), None, None, true);
+            }
+            Err(error) => self.problem = Some(unreadable(path, &error)),
+        }
+    }
+
+    /// Forgets the scene file that was there.
+    fn leave_for(&mut self, path: PathBuf, text: &Arc<str>) {
+        self.discard_autosave();
+        self.path = path;
+        self.disk = text.clone();
+        (self.present, self.saved, self.frames) = (None, None, None);
+        self.has_conflict = false;
+        self.history.clear();
+        self.recovered = std::fs::read_to_string(self.autosave_path()).ok();
+    }
+
     /// Reads the scene file again; what was edited can be brought back by undo.
     pub fn reload(&mut self) {
         self.read_disk();
@@ -118,12 +145,7 @@ impl Session {
                 self.disk = text.clone();
                 self.read(text, None, Some("reload"), true);
             }
-            Err(error) => {
-                self.problem = Some(format!(
-                    "{}: cannot be read ({error}); expected a scene file; correct the path",
-                    self.path.display()
-                ));
-            }
+            Err(error) => self.problem = Some(unreadable(&self.path, &error)),
         }
     }
 
@@ -134,10 +156,23 @@ impl Session {
         change: Option<&'static str>,
         is_saved: bool,
     ) {
+        self.begin_reading(text, None, composition, change, is_saved);
+    }
+
+    fn begin_reading(
+        &mut self,
+        text: Arc<str>,
+        other: Option<PathBuf>,
+        composition: Option<Composition>,
+        change: Option<&'static str>,
+        is_saved: bool,
+    ) {
         self.problem = None;
         let (sender, result) = channel();
-        let (path, wake) = (self.path.clone(), self.wake.clone());
-        let frame = self.frames.clone().map(|frames| (frames, self.frame));
+        let path = other.clone().unwrap_or_else(|| self.path.clone());
+        let wake = self.wake.clone();
+        let frames = self.frames.clone().filter(|_| other.is_none());
+        let frame = frames.map(|frames| (frames, self.frame));
         thread::spawn(move || {
             // Nobody waits for it if another text came meanwhile.
             let _ = sender.send(load(&path, text, frame));
@@ -148,8 +183,14 @@ impl Session {
             composition,
             change,
             is_saved,
+            other,
         });
     }
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> String {
+    let path = path.display();
+    format!("{path}: cannot be read ({error}); expected a scene file; correct the path")
 }
 
 /// Reads a text as the scene file of that path.
@@ -165,8 +206,9 @@ fn load(
     let document = Document::parse(&text).map_err(|error| error.to_string())?;
     let geometry = Geometry::build(&scene).map_err(|error| error.to_string())?;
     let mut base = document.composition(&scene);
-    if frame.is_some() {
+    if let Some((frames, index)) = &frame {
         base.camera = CameraPose::Matrix(scene.camera.world_from_camera);
+        base.frame = frames.posed()[*index].lead();
     }
     Ok(Box::new(Loaded {
         base,

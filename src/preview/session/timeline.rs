@@ -7,7 +7,6 @@ use super::Session;
 use crate::preview::composition::{Composition, rounded};
 use crate::preview::frames::Frames;
 use crate::preview::still::Still;
-use crate::scene::Shutter;
 use crate::sequence::SequenceOptions;
 
 impl Session {
@@ -42,19 +41,7 @@ impl Session {
     /// The picture's time among the scene's own keys.
     pub fn set_time(&mut self, time_secs: f64) {
         self.edit("time", |composition| {
-            let time_secs = rounded(time_secs, 1e-4);
-            composition.shutter = Some(match composition.shutter {
-                Some(shutter) => Shutter {
-                    time_secs,
-                    ..shutter
-                },
-                None => Shutter {
-                    exposure_secs: 0.0,
-                    readout_secs: 0.0,
-                    samples: None,
-                    time_secs,
-                },
-            });
+            composition.set_time(rounded(time_secs, 1e-4));
         });
     }
 
@@ -66,15 +53,12 @@ impl Session {
 
     /// What a frame brings is no edit: it is that of the frame which is shown.
     pub(super) fn keep_frame(&self, composition: &mut Composition, of: &Composition) {
-        let Some(frames) = &self.frames else {
+        if self.frames.is_none() {
             return;
-        };
-        composition.camera = of.camera;
+        }
+        (composition.camera, composition.frame) = (of.camera, of.frame);
         if let (Some(shutter), Some(own)) = (&mut composition.shutter, of.shutter) {
             shutter.time_secs = own.time_secs;
-        }
-        if frames.pull_focus() {
-            composition.lens.focus_distance_m = of.lens.focus_distance_m;
         }
     }
 

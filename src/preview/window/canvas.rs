@@ -214,7 +214,7 @@ impl Canvas {
         if response.drag_started()
             && let Some(at) = ui.input(|input| input.pointer.press_origin())
         {
-            session.end_gesture();
+            session.begin_gesture();
             self.gesture = Some(self.begin(ui, response, session, at, modifiers));
         }
         if response.dragged()
@@ -308,7 +308,7 @@ impl Canvas {
             foot,
             foot_at,
             radius: foot_at.distance(at).max(1.0),
-            from: session.composition()?.objects[object],
+            from: session.composition()?.placement(object),
         })
     }
 
@@ -328,7 +328,7 @@ impl Canvas {
             }) => {
                 let factor = f64::from(foot_at.distance(at) / radius).max(0.01);
                 session.edit("scale", |composition| {
-                    composition.objects[object] = scaled(&from, factor, foot);
+                    composition.place(object, scaled(&from, factor, foot));
                 });
             }
             Some(Gesture::Gizmo { .. }) => self.drag_gizmo(session, at),
@@ -402,8 +402,8 @@ impl Canvas {
             let under = session.pick(self.pixel(at)).and_then(|pick| pick.object);
             if let Some(object) = under.or(self.selected) {
                 session.edit("turn", |composition| {
-                    let placement = &mut composition.objects[object];
-                    *placement = turned(placement, TURN_DEG * notches_f64);
+                    let placement = composition.placement(object);
+                    composition.place(object, turned(&placement, TURN_DEG * notches_f64));
                 });
             }
         } else if modifiers.command {
@@ -445,8 +445,8 @@ fn set(
 
 /// The point that an object stands on.
 fn foot(session: &Session, object: usize) -> Option<DVec3> {
-    let placement = &session.composition()?.objects[object];
-    session.loaded()?.geometry.lowest_point(object, placement)
+    let placement = session.composition()?.placement(object);
+    (session.loaded()?.geometry).lowest_point(object, &placement)
 }
 
 fn seen(session: &Session, point: DVec3) -> Option<DVec2> {
@@ -459,6 +459,6 @@ fn seen(session: &Session, point: DVec3) -> Option<DVec2> {
 
 /// Where a camera that looks at nothing in particular turns about.
 fn focus_or_metre(session: &Session) -> f64 {
-    let focus = session.composition().map(|c| c.lens.focus_distance_m);
+    let focus = session.composition().map(|c| c.focus_distance_m());
     focus.filter(|focus| focus.is_finite()).unwrap_or(1.0)
 }

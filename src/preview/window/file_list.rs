@@ -18,6 +18,8 @@ struct Listing {
 pub(super) struct FileList {
     pub is_open: bool,
     folder: PathBuf,
+    /// Nothing outside is entered.
+    bounds: Option<PathBuf>,
     /// Read when the folder is entered.
     listing: Result<Listing, String>,
 }
@@ -29,8 +31,18 @@ impl FileList {
         Self {
             is_open: false,
             folder: absolute.parent().unwrap_or(Path::new("/")).to_path_buf(),
+            bounds: None,
             listing: Ok(Listing::default()),
         }
+    }
+
+    /// Shows the present folder and what lies in it from now on, and nothing else.
+    pub fn keep_to_folder(&mut self) {
+        self.bounds = Some(self.folder.clone());
+    }
+
+    pub fn folder(&self) -> &Path {
+        &self.folder
     }
 
     pub fn open(&mut self) {
@@ -39,6 +51,10 @@ impl FileList {
     }
 
     fn enter(&mut self, folder: PathBuf) {
+        let bounds = self.bounds.as_ref();
+        if bounds.is_some_and(|bounds| !folder.starts_with(bounds)) {
+            return;
+        }
         self.listing = list(&folder).map_err(|error| format!("it cannot be read ({error})"));
         self.folder = folder;
     }
@@ -143,5 +159,22 @@ mod tests {
         assert_eq!(names(&listing.files), ["a.toml", "b.GLB"]);
         assert_eq!(names(&listing.folders), ["models"]);
         assert!(list(&folder.path().join("nowhere")).is_err());
+    }
+
+    #[test]
+    fn a_list_that_is_kept_to_its_folder_stays_there() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("models")).unwrap();
+        let mut files = FileList::beside(&folder.path().join("scene.toml"));
+        let enters = |files: &mut FileList, path: &Path| {
+            files.enter(path.to_path_buf());
+            files.folder == path
+        };
+        let above = folder.path().parent().unwrap();
+        assert!(enters(&mut files, above), "control");
+        assert!(enters(&mut files, folder.path()));
+        files.keep_to_folder();
+        assert!(!enters(&mut files, above));
+        assert!(enters(&mut files, &folder.path().join("models")));
     }
 }

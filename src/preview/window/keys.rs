@@ -15,6 +15,7 @@ pub(super) enum Act {
     Wireframe,
     Wipe,
     Gizmo,
+    SetKey,
     Remove,
     WiderAperture,
     NarrowerAperture,
@@ -72,6 +73,12 @@ const KEYS: &[(Modifiers, Key, Act, &str)] = &[
     ),
     (
         Modifiers::NONE,
+        Key::K,
+        Act::SetKey,
+        "a key for the selected object at the present time",
+    ),
+    (
+        Modifiers::NONE,
         Key::Delete,
         Act::Remove,
         "remove the selected object",
@@ -101,6 +108,8 @@ const POINTER: &[(&str, &str)] = &[
     ("wheel", "zoom to single pixels"),
     ("Shift + wheel", "turn the object under the pointer"),
     ("Ctrl + wheel", "dolly the camera"),
+    ("click the timeline", "to that time; on a key, to its time"),
+    ("drag a key on the timeline", "another time for it"),
     ("drop a file", "scene, mesh, photograph or environment"),
 ];
 

@@ -2,9 +2,11 @@
 
 mod canvas;
 mod file_list;
+mod key_lane;
 mod keys;
 mod panel;
 mod stream;
+mod system_dialog;
 mod timeline;
 
 use std::path::{Path, PathBuf};
@@ -13,7 +15,7 @@ use std::time::{Duration, Instant};
 use eframe::egui::{self, Ui, ViewportCommand};
 use glam::DVec2;
 
-use super::composition::Opening;
+use super::composition::{Opening, Track};
 use super::frames::Frames;
 use super::gizmo::Handle;
 use super::render_threads::Level;
@@ -23,6 +25,7 @@ use canvas::Canvas;
 use file_list::FileList;
 use keys::Act;
 pub use stream::{StreamApp, StreamFeed, show_stream};
+use system_dialog::{Answer, SystemDialog, picked_file};
 use timeline::Timeline;
 
 /// A third of a stop, as a factor of the f-number.
@@ -36,6 +39,11 @@ pub struct App {
     timeline: Timeline,
     shows_help: bool,
     file_list: FileList,
+    system_dialog: Option<SystemDialog>,
+    /// Until one was not there.
+    has_system_dialogs: bool,
+    /// The scene that is shown; another has other objects and times.
+    scene_path: PathBuf,
     still_path: String,
     /// The window is asked to close while there is unsaved work.
     asks_to_close: bool,
@@ -49,6 +57,9 @@ impl App {
         let still = session.path().with_extension("png");
         Self {
             file_list: FileList::beside(session.path()),
+            system_dialog: None,
+            has_system_dialogs: false,
+            scene_path: session.path().to_path_buf(),
             still_path: format!("still-{}", still.file_name().unwrap_or_default().display()),
             session,
             canvas: Canvas::default(),
@@ -70,6 +81,11 @@ impl App {
         self.canvas.grip(&self.session, handle)
     }
 
+    /// Where the timeline has a time of the scene's keys, in points.
+    pub fn time_on_screen(&self, time_secs: f64) -> Option<egui::Pos2> {
+        self.timeline.on_screen(time_secs)
+    }
+
     pub fn select(&mut self, object: Option<usize>) {
         self.canvas.selected = object;
     }
@@ -78,15 +94,21 @@ impl App {
     pub fn show(&mut self, ui: &mut Ui) {
         let begin = Instant::now();
         self.session.tick(begin);
+        if self.scene_path != self.session.path() {
+            self.scene_path = self.session.path().to_path_buf();
+            (self.canvas, self.timeline) = (Canvas::default(), Timeline::default());
+        }
         self.take_files(ui);
         for act in keys::pressed(ui.ctx()) {
-            self.act(act);
+            self.act(act, ui.ctx());
         }
         egui::Panel::top("commands").show(ui, |ui| self.commands(ui));
         egui::Panel::bottom("status").show(ui, |ui| self.status(ui));
         if Timeline::is_needed(&self.session) {
-            egui::Panel::bottom("timeline")
-                .show(ui, |ui| self.timeline.show(ui, &mut self.session));
+            egui::Panel::bottom("timeline").show(ui, |ui| {
+                let selected = self.canvas.selected;
+                self.timeline.show(ui, &mut self.session, selected);
+            });
         }
         egui::Panel::right("settings")
             .default_size(PANEL_WIDTH)
@@ -104,7 +126,7 @@ impl App {
         self.longest_frame = self.longest_frame.max(begin.elapsed());
     }
 
-    fn act(&mut self, act: Act) {
+    fn act(&mut self, act: Act, context: &egui::Context) {
         let session = &mut self.session;
         let mut stop = |factor: f64| {
             session.edit("f-number", |composition| {
@@ -116,7 +138,7 @@ impl App {
         };
         match act {
             Act::Help => self.shows_help = !self.shows_help,
-            Act::Open => self.file_list.open(),
+            Act::Open => self.open_file(context),
             Act::Save => session.save(),
             Act::Undo => session.undo(),
             Act::Redo => session.redo(),
@@ -127,6 +149,11 @@ impl App {
             Act::Wipe => self.canvas.wipe = self.canvas.wipe.is_none().then_some(0.5),
             Act::WiderAperture => stop(1.0 / THIRD_STOP),
             Act::NarrowerAperture => stop(THIRD_STOP),
+            Act::SetKey => {
+                if let Some(object) = self.canvas.selected {
+                    session.set_key(Track::Object(object));
+                }
+            }
             Act::Remove => {
                 if let Some(object) = self.canvas.selected.take() {
                     session.remove(object);
@@ -139,19 +166,53 @@ impl App {
         let dropped = ui.input(|input| input.raw.dropped_files.clone());
         for file in dropped {
             let pixel = self.canvas.pointed(ui);
-            self.take_file(file.path(), pixel);
+            self.session.take_file(file.path(), pixel);
         }
+        self.take_picked_file();
         if let Some(file) = self.file_list.show(ui.ctx()) {
-            self.take_file(&file, None);
+            self.session.take_file(&file, None);
         }
     }
 
-    fn take_file(&mut self, path: &Path, pixel: Option<DVec2>) {
-        self.session.take_file(path, pixel);
-        if path.extension().is_some_and(|ending| ending == "toml") {
-            self.canvas = Canvas::default();
-            self.timeline = Timeline::default();
+    /// Files to open are asked for by the system's dialog, where it has one.
+    fn with_system_dialogs(mut self) -> Self {
+        self.has_system_dialogs = cfg!(target_os = "linux");
+        self
+    }
+
+    fn open_file(&mut self, context: &egui::Context) {
+        if self.system_dialog.is_some() {
+            return;
         }
+        if !self.has_system_dialogs {
+            self.file_list.open();
+            return;
+        }
+        let (context, folder) = (context.clone(), self.file_list.folder().to_path_buf());
+        let wake = move || context.request_repaint();
+        self.system_dialog = Some(SystemDialog::show(move || picked_file(&folder), wake));
+    }
+
+    fn take_picked_file(&mut self) {
+        let Some(answer) = self.system_dialog.as_ref().map(SystemDialog::answer) else {
+            return;
+        };
+        if answer != Answer::Open {
+            self.system_dialog = None;
+        }
+        match answer {
+            Answer::Open | Answer::Closed => {}
+            Answer::Chosen(file) => self.session.take_file(&file, None),
+            Answer::Missing => {
+                self.has_system_dialogs = false;
+                self.file_list.open();
+            }
+        }
+    }
+
+    /// The list of files shows the scene's folder and what lies in it, and nothing else.
+    pub fn keep_to_folder(&mut self) {
+        self.file_list.keep_to_folder();
     }
 
     fn commands(&mut self, ui: &mut Ui) {
@@ -161,7 +222,7 @@ impl App {
                 .on_hover_text("scene, mesh, photograph or environment")
                 .clicked()
             {
-                self.file_list.open();
+                self.open_file(ui.ctx());
             }
             let session = &mut self.session;
             let dirty = session.is_dirty();
@@ -358,7 +419,7 @@ pub fn run(scene: &Path, frames: Option<Frames>, frame_time: Duration) -> Result
             if let Some(frames) = frames {
                 session.follow(frames);
             }
-            Ok(Box::new(App::new(session)))
+            Ok(Box::new(App::new(session).with_system_dialogs()))
         }),
     )
 }

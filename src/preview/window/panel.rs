@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::canvas::Canvas;
 use crate::preview::composition::{
-    Composition, LensForm, Opening, Rotation, rounded, rounded_m, virtual_objects,
+    Composition, Opening, Rotation, Track, rounded, rounded_m, virtual_objects,
 };
 use crate::preview::session::Session;
 use crate::preview::view::View;
@@ -21,7 +21,7 @@ pub(super) fn show(ui: &mut Ui, session: &mut Session, canvas: &mut Canvas) {
             return;
         };
         ui.separator();
-        lens(ui, session, &composition.lens);
+        lens(ui, session, &composition);
         ui.separator();
         light(ui, session, &composition);
         ui.separator();
@@ -76,8 +76,9 @@ fn slide(
     }
 }
 
-fn lens(ui: &mut Ui, session: &mut Session, lens: &LensForm) {
+fn lens(ui: &mut Ui, session: &mut Session, composition: &Composition) {
     ui.strong("Lens");
+    let (lens, focus_distance_m) = (&composition.lens, composition.focus_distance_m());
     match lens.opening {
         Opening::FNumber {
             f_number,
@@ -127,10 +128,18 @@ fn lens(ui: &mut Ui, session: &mut Session, lens: &LensForm) {
                 .max_decimals(4)
                 .largest_finite(1000.0)
         },
-        lens.focus_distance_m,
+        focus_distance_m,
         1e-4,
-        |composition, focus| composition.lens.focus_distance_m = focus.max(least),
+        |composition, focus| composition.focus(focus.max(least)),
     );
+    if session.moves() {
+        keys(
+            ui,
+            session,
+            Track::Focus,
+            ["Set focus key", "Delete focus key"],
+        );
+    }
     ui.horizontal(|ui| {
         let mut aperture = lens.aperture;
         let name = match aperture {
@@ -257,7 +266,9 @@ fn objects(ui: &mut Ui, session: &mut Session, canvas: &mut Canvas) {
         });
     }
     let placement = (canvas.selected)
-        .and_then(|object| Some((object, *session.composition()?.objects.get(object)?)));
+        .and_then(|object| Some((object, session.composition()?)))
+        .filter(|(object, composition)| *object < composition.objects.len())
+        .map(|(object, composition)| (object, composition.placement(object)));
     let Some((object, mut placement)) = placement else {
         canvas.selected = None;
         return;
@@ -285,15 +296,32 @@ fn objects(ui: &mut Ui, session: &mut Session, canvas: &mut Canvas) {
         placement.scale = before.scale;
     }
     if placement != before {
-        session.edit("object", |composition| {
-            composition.objects[object] = placement
-        });
+        session.edit("object", |composition| composition.place(object, placement));
     }
+    keys(
+        ui,
+        session,
+        Track::Object(object),
+        ["Set key", "Delete key"],
+    );
     material::show(ui, session, object);
     if ui.button("Remove object").clicked() {
         session.remove(object);
         canvas.selected = None;
     }
+}
+
+/// Buttons of these names: a key at the picture's time.
+fn keys(ui: &mut Ui, session: &mut Session, track: Track, [set, delete]: [&str; 2]) {
+    ui.horizontal(|ui| {
+        if ui.button(set).clicked() {
+            session.set_key(track);
+        }
+        let button = egui::Button::new(delete);
+        if ui.add_enabled(session.has_key(track), button).clicked() {
+            session.delete_key(track);
+        }
+    });
 }
 
 fn numbers(ui: &mut Ui, label: &str, values: &mut DVec3, speed: f64, decimals: usize) {

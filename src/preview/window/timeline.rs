@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use eframe::egui::{DragValue, Slider, Ui};
+use eframe::egui::{DragValue, Pos2, Slider, Ui};
 
+use super::key_lane::{Axis, KeyLane};
 use crate::preview::session::Session;
 
 /// Between two pictures where the scene has keys and no frames, seconds.
@@ -14,6 +15,7 @@ pub(super) struct Timeline {
     /// Numbers of frames, the end not included; `None`: all.
     range: Option<(u32, u32)>,
     output: String,
+    lane: KeyLane,
 }
 
 impl Default for Timeline {
@@ -22,6 +24,7 @@ impl Default for Timeline {
             plays: false,
             range: None,
             output: "frames-out".to_owned(),
+            lane: KeyLane::default(),
         }
     }
 }
@@ -29,11 +32,25 @@ impl Default for Timeline {
 impl Timeline {
     /// The scene has something that time changes.
     pub fn is_needed(session: &Session) -> bool {
-        session.frames().is_some() || session.loaded().is_some_and(|loaded| loaded.moves())
+        session.frames().is_some() || session.moves()
     }
 
-    pub fn show(&mut self, ui: &mut Ui, session: &mut Session) {
+    /// Where a time of the scene's keys stands on the screen, points.
+    pub fn on_screen(&self, time_secs: f64) -> Option<Pos2> {
+        self.lane.on_screen(time_secs)
+    }
+
+    /// `selected`: the object whose keys stand out.
+    pub fn show(&mut self, ui: &mut Ui, session: &mut Session, selected: Option<usize>) {
         self.play_on(session);
+        if let Some(frames) = session.frames() {
+            let times = frames.posed().iter().map(|frame| frame.time_secs());
+            let times = times.collect::<Option<Vec<_>>>().unwrap_or_default();
+            let has_keys = session.composition().is_some_and(|c| c.has_keys());
+            if let Some(axis) = Axis::of_frames(times).filter(|_| has_keys) {
+                self.lane.show(ui, session, selected, axis);
+            }
+        }
         ui.horizontal(|ui| {
             let label = if self.plays { "Pause" } else { "Play" };
             if ui.button(label).clicked() {
@@ -42,7 +59,7 @@ impl Timeline {
             ui.spacing_mut().slider_width = (ui.available_width() - 420.0).max(80.0);
             match session.frames().is_some() {
                 true => self.frames(ui, session),
-                false => times(ui, session),
+                false => self.times(ui, session, selected),
             }
         });
     }
@@ -60,7 +77,7 @@ impl Timeline {
                 session.go_to_frame(next);
                 is_there
             }
-            None => match (session.composition(), span_secs(session)) {
+            None => match (session.composition(), session.span_secs()) {
                 (Some(composition), Some((_, last))) => {
                     let next = composition.time_secs() + STEP_SECS;
                     if next <= last {
@@ -115,25 +132,23 @@ impl Timeline {
             }
         });
     }
-}
 
-fn span_secs(session: &Session) -> Option<(f64, f64)> {
-    session.loaded().map(|loaded| loaded.span_secs())
-}
-
-fn times(ui: &mut Ui, session: &mut Session) {
-    let Some((first, last)) = span_secs(session) else {
-        return;
-    };
-    let before = session.composition().map_or(0.0, |c| c.time_secs());
-    let mut time_secs = before;
-    let slider = Slider::new(&mut time_secs, first..=last.max(first + STEP_SECS));
-    let response = ui.add(slider.max_decimals(4).text("time, s"));
-    if response.changed() && time_secs != before {
-        session.set_time(time_secs);
+    fn times(&mut self, ui: &mut Ui, session: &mut Session, selected: Option<usize>) {
+        let Some((first, last)) = session.span_secs() else {
+            return;
+        };
+        let before = session.composition().map_or(0.0, |c| c.time_secs());
+        let mut time_secs = before;
+        ui.label("time, s");
+        let value = DragValue::new(&mut time_secs).speed(0.01).max_decimals(4);
+        let response = ui.add(value);
+        if response.changed() && time_secs != before {
+            session.set_time(time_secs);
+        }
+        if response.drag_stopped() || response.lost_focus() {
+            session.end_gesture();
+        }
+        self.lane
+            .show(ui, session, selected, Axis::of_span(first, last));
     }
-    if response.drag_stopped() {
-        session.end_gesture();
-    }
-    ui.label("the scene's own keys");
 }

@@ -81,6 +81,9 @@ impl Renderer {
         if self.stated.is_some() {
             self.look_ahead(watcher);
         }
+        if !self.plan(watcher)? {
+            return Ok(());
+        }
         let stopwatch = Stopwatch::start();
         let core = &mut self.core;
         let frame = core.packed.frame;

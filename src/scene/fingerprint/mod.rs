@@ -47,6 +47,7 @@ impl Scene {
             objects,
             shutter,
             camera_path,
+            focus_path,
             settings: _,
             warnings: _,
         } = self;
@@ -58,6 +59,10 @@ impl Scene {
         (photo, (camera, lens)).add_to(&mut hash);
         (environment, lights).add_to(&mut hash);
         (objects, (shutter, camera_path)).add_to(&mut hash);
+        // Scenes from before there were such keys keep their fingerprint.
+        if !focus_path.is_empty() {
+            focus_path.add_to(&mut hash);
+        }
         hash.finish()
     }
 }

@@ -3,7 +3,9 @@ use std::sync::Arc;
 
 use super::*;
 use crate::scene::trajectory::CameraPath;
-use crate::scene::{Material, NoiseFit, NoiseProfile, NoiseSettings, Texture, TextureRef, Wrap};
+use crate::scene::{
+    FocusPath, Material, NoiseFit, NoiseProfile, NoiseSettings, Texture, TextureRef, Wrap,
+};
 
 fn far() -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/far/scene.toml");
@@ -93,11 +95,12 @@ fn what_changes_the_picture_changes_the_fingerprint() {
     sampled_otherwise.warnings.push("x".into());
     assert_eq!(sampled_otherwise.fingerprint(), before);
 
-    let changes: [fn(&mut Scene); 7] = [
+    let changes: [fn(&mut Scene); 8] = [
         |s| s.settings.max_bounces += 1,
         |s| s.lens.focus_distance_m += 1e-12,
         |s| s.photo.as_mut().unwrap().linear[77][1] += 1e-6,
         |s| s.lights.truncate(0),
+        |s| s.focus_path = FocusPath::new(vec![(0.0, s.lens.focus_distance_m)]),
         |s| s.camera_path = CameraPath::new(vec![(0.0, s.camera.world_from_camera)]),
         |s| {
             let primitive = &mut s.objects.last_mut().unwrap().instances[0].primitive;

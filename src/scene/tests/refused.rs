@@ -460,6 +460,18 @@ fn motion() {
             "other than 0",
         ),
         (
+            "[lens]\n@@[[lens.motion]]\ntime_secs = 0\n",
+            "lacks `focus_distance_m`",
+        ),
+        (
+            "[lens]\n[[lens.motion]]\ntime_secs = 0\nfocus_distance_m = @@0\n",
+            "above 0",
+        ),
+        (
+            "[lens]\nf_number = 2\nfocal_length_mm = 50\nfocus_distance_m = 1\n[[lens.motion]]\ntime_secs = 0\nfocus_distance_m = @@0.04\n",
+            "nearer than the focal length",
+        ),
+        (
             "[[real]]\nshape = \"sphere\"\n[[real.@@motion]]\ntime_secs = 0\n",
             "[[virtual]] only",
         ),

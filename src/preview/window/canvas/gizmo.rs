@@ -4,7 +4,7 @@ use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke, Ui, Ve
 use glam::DVec2;
 
 use super::{Canvas, Gesture};
-use crate::preview::composition::Placement;
+use crate::preview::composition::{Placement, moves_within};
 use crate::preview::geometry::{camera_ray, seen_at};
 use crate::preview::gizmo::{Gizmo, Handle, dragged, measure, within_half_turn};
 use crate::preview::session::Session;
@@ -23,17 +23,17 @@ const COLOURS: [Color32; 3] = [
 const CAUGHT: Color32 = Color32::from_rgb(255, 235, 90);
 
 impl Canvas {
-    /// Of the selected object; objects with keys stand where these say, and have none.
+    /// Of the selected object; what is animated within its mesh stands where that says, and has none.
     fn gizmo(&self, session: &Session) -> Option<(usize, Gizmo)> {
         let object = self.selected.filter(|_| self.shows_gizmo)?;
         let (loaded, composition) = (session.loaded()?, session.composition()?);
-        if loaded.scene.objects.get(object)?.is_animated() {
+        if moves_within(loaded.scene.objects.get(object)?) {
             return None;
         }
-        let placement = composition.objects.get(object)?;
+        let placement = composition.placement(object);
         let px_per_pt = self.size.x / self.place.width();
         let length_px = f64::from(ARROW_PT * px_per_pt);
-        let gizmo = Gizmo::at(&loaded.scene.camera, composition, placement, length_px)?;
+        let gizmo = Gizmo::at(&loaded.scene.camera, composition, &placement, length_px)?;
         Some((object, gizmo))
     }
 
@@ -83,7 +83,7 @@ impl Canvas {
     pub(super) fn begin_gizmo(&self, session: &Session, at: Pos2) -> Option<Gesture> {
         let handle = self.handle_at(session, at)?;
         let (object, _) = self.gizmo(session)?;
-        let from = session.composition()?.objects[object];
+        let from = session.composition()?.placement(object);
         Some(Gesture::Gizmo {
             object,
             handle,
@@ -127,7 +127,7 @@ impl Canvas {
             *by = dragged_by;
         }
         session.edit("gizmo", |composition| {
-            composition.objects[object] = dragged(handle, &from, dragged_by);
+            composition.place(object, dragged(handle, &from, dragged_by));
         });
     }
 

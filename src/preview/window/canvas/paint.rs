@@ -75,7 +75,7 @@ impl Canvas {
     pub(super) fn frame(&self, session: &Session, object: usize) -> Option<Rect> {
         let (loaded, composition) = (session.loaded()?, session.composition()?);
         let (lo, hi) = loaded.geometry.bounds(object)?;
-        let world_from_object = composition.objects.get(object)?.world_from_object();
+        let world_from_object = composition.world_from_object(object);
         let mut frame = Rect::NOTHING;
         for corner in 0..8_u32 {
             let pick = |bit: u32, axis: usize| {
@@ -99,10 +99,12 @@ impl Canvas {
         let camera = &loaded.scene.camera;
         camera_ray(camera, composition, pixel)?;
         let mut words = format!("({:.0}, {:.0})", pixel.x.floor(), pixel.y.floor());
-        if let Some(shown) = session.shown()
-            && shown.picture.width == camera.width
-        {
-            let index = pixel.y as usize * camera.width as usize + pixel.x as usize;
+        if let Some(shown) = session.shown() {
+            // The coarse picture is smaller.
+            let (width, height) = (shown.picture.width, shown.picture.height);
+            let x = pixel.x * f64::from(width) / f64::from(camera.width);
+            let y = pixel.y * f64::from(height) / f64::from(camera.height);
+            let index = y as usize * width as usize + x as usize;
             if let Some([r, g, b]) = shown.picture.linear.get(index) {
                 words += &format!("  linear {r:.4} {g:.4} {b:.4}");
             }
@@ -111,7 +113,7 @@ impl Canvas {
             }
         }
         if let Some(pick) = session.pick(pixel) {
-            let circle = confusion_px(&composition.lens.lens(), camera, pick.depth_m);
+            let circle = confusion_px(&composition.lens(), camera, pick.depth_m);
             let what = pick
                 .object
                 .map_or("real", |object| &loaded.scene.objects[object].name);

@@ -70,8 +70,7 @@ fn number(
 }
 
 fn motion_blur(ui: &mut Ui, session: &mut Session, composition: &Composition) {
-    let moves = session.loaded().is_some_and(|loaded| loaded.moves());
-    if !moves {
+    if !session.moves() {
         return;
     }
     let is_on = (composition.shutter).is_some_and(|shutter| shutter.exposure_secs > 0.0);
