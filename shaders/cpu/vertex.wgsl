@@ -12,7 +12,7 @@ import package::camera::sampler::{SampleSet, fourth, pair, second_pair, third};
 import package::light::backdrop::backdrop_radiance;
 import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres};
 import package::cpu::contribution::{
-    accumulate, density_weight, draw, draw_one_of, events_after, from_lens_after, left_to_photons, sees_backdrop, vertex_left_to_photons,
+    accumulate, density_weight, draw, draw_one_of, events_after, from_lens_after, is_smooth, left_to_photons, sees_backdrop, vertex_left_to_photons,
 };
 import package::light::environment::share_left_to_eye;
 import package::light::guide::{GUIDE_SHARE, guide_cell, guide_count, guide_pdf, guide_sample};
