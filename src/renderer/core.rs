@@ -42,8 +42,6 @@ pub(super) struct Core {
     pub time_secs: f64,
     /// The pilot was not ended by its watcher.
     pub is_planned: bool,
-    /// In a draft the difference is evaluated at one in this many of the plan's turns.
-    pub thinning: u32,
     /// What a ray in every pixel took the last time.
     pub secs_per_ray: Option<f64>,
 }

@@ -34,24 +34,17 @@ impl Renderer {
         self.restart(false, Changed::Plan, watcher)
     }
 
-    /// What a draft traces: depth, normal and albedo of the first hit or not, and the difference at one in `thinning` of the plan's turns, at least 1,
-    /// with the same expectation and more noise. The film starts anew; false, and it stays, where both are as they were.
+    /// Depth, normal and albedo of the first hit are traced from now on, or are not; the film starts anew. False, and it stays, where it is so already.
     ///
     /// # Errors
     /// As [`Renderer::set_lens`].
-    pub fn set_draft(
-        &mut self,
-        guides: bool,
-        thinning: u32,
-        watcher: &Watcher<'_>,
-    ) -> Result<bool, RenderError> {
+    pub fn set_guides(&mut self, guides: bool, watcher: &Watcher<'_>) -> Result<bool, RenderError> {
         let flags = &mut self.core.packed.frame.flags;
-        if (*flags & FRAME_AOVS != 0, self.core.thinning) == (guides, thinning) {
+        if (*flags & FRAME_AOVS != 0) == guides {
             return Ok(false);
         }
         *flags = *flags & !FRAME_AOVS | if guides { FRAME_AOVS } else { 0 };
         self.core.options.guides = guides;
-        self.core.thinning = thinning;
         self.restart(false, Changed::Plan, watcher)?;
         Ok(true)
     }

@@ -243,7 +243,6 @@ impl Renderer {
                 photo_light: None,
                 backdrop_share: None,
                 is_planned: false,
-                thinning: 1,
                 secs_per_ray: None,
             },
             driver: Driver::Still,

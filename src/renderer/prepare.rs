@@ -206,9 +206,6 @@ impl Renderer {
         cpu::pilot(&mut core.packed, core.lens_grid.as_ref(), &meter);
         core.is_planned = !meter.is_cancelled();
         without.apply_to_pixels(&mut core.packed.pixels);
-        for pixel in &mut core.packed.pixels {
-            pixel.difference_period *= core.thinning;
-        }
         let begun = core.places.end(Place::Pilot, begun);
         let photons = core.packed.photons_per_ray > 0;
         let note = core.packed.black_shadows(photons);

@@ -217,23 +217,33 @@ fn a_pilot_that_was_ended_is_run_again_before_the_first_sample() {
 }
 
 #[test]
-fn a_thinned_draft_takes_fewer_rays() {
+fn guides_are_traced_where_they_are_asked_for() {
     let nobody = Watcher::none();
     let options = RendererOptions {
         guides: true,
         draft: true,
         ..RendererOptions::default()
     };
-    let rays = |guides: bool, thinning: u32| {
-        let mut renderer =
-            Renderer::new(scene_with_a_photo(false), options, &nobody).expect("fits");
-        renderer.set_draft(guides, thinning, &nobody).expect("fits");
-        renderer
-            .advance(Budget::Complete, &nobody)
-            .expect("renders");
-        renderer.rays().traced()
+    let mut renderer = Renderer::new(scene_with_a_photo(false), options, &nobody).expect("fits");
+    let mut nearest = |guides: bool| {
+        let before = renderer.rays().traced();
+        renderer.set_guides(guides, &nobody).expect("fits");
+        (renderer.advance(Budget::Complete, &nobody)).expect("renders");
+        let depth = renderer
+            .planes()
+            .depth
+            .into_iter()
+            .filter(|depth| depth.is_finite());
+        (
+            depth.fold(f32::INFINITY, f32::min),
+            renderer.rays().traced() - before,
+        )
     };
-    let [whole, without_guides, thinned] = [rays(true, 1), rays(false, 1), rays(false, 2)];
-    assert!(without_guides <= whole, "{without_guides} of {whole}");
-    assert!(thinned < without_guides, "{thinned} of {without_guides}");
+    let [with, without, again] = [true, false, true].map(&mut nearest);
+    assert_eq!(with, again);
+    assert!((with.0 - 1.0).abs() < 1e-3, "the square: {with:?}");
+    assert!(
+        without.0 != with.0 && without.1 <= with.1,
+        "control: {without:?}"
+    );
 }

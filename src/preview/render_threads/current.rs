@@ -1,7 +1,6 @@
 //! A renderer at what is wanted: built anew where it must be, else edited.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use super::{Level, Wanted};
 use crate::preview::composition::{Composition, Difference};
@@ -24,29 +23,6 @@ pub(super) struct Current {
     scene: Arc<Scene>,
     composition: Composition,
     has_real: bool,
-    /// Of the coarse picture's difference, now and from the next edit on.
-    thinning: u32,
-    next_thinning: u32,
-}
-
-/// With this the coarse picture takes about two thirds of the time.
-const THIN: u32 = 2;
-
-impl Current {
-    /// Thins the difference where a coarse picture took longer than a frame, until one takes less than half of it.
-    pub fn pace(&mut self, took: Duration, frame_time: Duration) {
-        if took > frame_time {
-            self.next_thinning = THIN;
-        } else if took < frame_time / 2 {
-            self.next_thinning = 1;
-        }
-    }
-
-    /// Traces what the view shows; true if the film starts anew.
-    fn draft(&mut self, wanted: &Wanted, watcher: &Watcher<'_>) -> Result<bool, RenderError> {
-        let guides = wanted.view.needs_planes();
-        self.renderer.set_draft(guides, self.thinning, watcher)
-    }
 }
 
 /// Brings the renderer to what is wanted; what it was that changed, if the picture began anew.
@@ -64,10 +40,8 @@ pub(super) fn take_up(
     };
     if let Some(current) = current.as_mut().filter(|current| fits(current)) {
         let difference = Difference::between(&current.composition, &wanted.composition);
-        if !difference.is_none() {
-            current.thinning = current.next_thinning;
-        }
-        let begins = level == Level::Coarse && current.draft(wanted, watcher)?;
+        let guides = level == Level::Fine || wanted.view.needs_planes();
+        let begins = current.renderer.set_guides(guides, watcher)?;
         if difference.is_none() {
             return Ok(begins.then_some("view"));
         }
@@ -94,18 +68,18 @@ pub(super) fn take_up(
         ..RendererOptions::default()
     };
     // The memory of the scene before is free first.
-    let thinning = current.take().map_or(1, |before| before.next_thinning);
-    let new = current.insert(Current {
-        renderer: Renderer::new(scene, options, watcher)?,
+    *current = None;
+    let mut renderer = Renderer::new(scene, options, watcher)?;
+    if level == Level::Coarse {
+        // The film has room for them, and another view asks for them.
+        renderer.set_guides(wanted.view.needs_planes(), watcher)?;
+    }
+    *current = Some(Current {
+        renderer,
         scene: wanted.scene.clone(),
         composition: wanted.composition.clone(),
         has_real,
-        thinning,
-        next_thinning: thinning,
     });
-    if level == Level::Coarse {
-        new.draft(wanted, watcher)?;
-    }
     Ok(Some("scene"))
 }
 

@@ -307,13 +307,10 @@ fn step(
         false => watcher.cancelled_by(&cancelled),
     };
     let spent_before = processor_time();
-    let begin = Instant::now();
-    let mut took = Duration::ZERO;
     let change = take_up(level, wanted, current, &watcher)?;
-    let Some(current) = current else {
+    let Some(Current { renderer, .. }) = current else {
         return Ok(true);
     };
-    let renderer = &mut current.renderer;
     let total = renderer.scene().settings.rays_per_pixel;
     let film = renderer.film();
     let pixels = u64::from(film.width) * u64::from(film.height);
@@ -324,7 +321,6 @@ fn step(
             _ => before.clamp(1, 8),
         };
         renderer.advance(Budget::Rays(pixels * u64::from(more)), &watcher)?;
-        took = begin.elapsed();
         if level == Level::Coarse && before == 0 {
             // More rays if the frame's time allows.
             let left = shared.frame_time.saturating_sub(wanted.since.elapsed());
@@ -340,15 +336,10 @@ fn step(
     if level == Level::Fine && samples < FIRST_FINE_RAYS.min(total) {
         return Ok(false);
     }
-    let rendered = Instant::now();
     let shown = match level {
         Level::Coarse => coarse_picture(renderer, wanted),
         Level::Fine => fine_picture(renderer, wanted),
     };
-    // What the first picture of a scene takes is not what edits take.
-    if level == Level::Coarse && before == 0 && change.is_some_and(|change| change != "scene") {
-        current.pace(took + rendered.elapsed(), shared.frame_time);
-    }
     let latency = change.map(|change| Latency {
         level,
         change,

@@ -67,8 +67,9 @@ fn slide(
 ) {
     let mut shown = value;
     let response = ui.add(slider(&mut shown).text(label));
-    if response.changed() {
-        let shown = rounded(shown, step);
+    // A slider rounds whatever it is given.
+    let shown = rounded(shown, step);
+    if response.changed() && shown != rounded(value, step) {
         session.edit(label, |composition| set(composition, shown));
     }
     if response.drag_stopped() {
