@@ -50,7 +50,7 @@ fn events_after(events: u32, depth: u32, side: u32, smooth_: bool) -> u32 {
 }
 
 fn is_smooth(s: Surface, side: u32, is_first: bool) -> bool {
-    if is_first || side != SIDE_VIRTUAL { return bsdf_is_polished(s); }
+    if is_first || side != SIDE_VIRTUAL || (frame.flags & FRAME_BACKDROP) != 0u { return bsdf_is_polished(s); }
     return bsdf_is_glossy(s);
 }
 
@@ -66,7 +66,7 @@ fn vertex_left_to_photons(st: ptr<function, PathState>, s: Surface) -> bool {
         && (*st).path.mode == MODE_MIXED
         && (*st).ray.side == SIDE_VIRTUAL
         && ((*st).path.events & (EVENT_SEEN | EVENT_REAL_CHAIN)) == EVENT_SEEN
-        && bsdf_is_glossy(s);
+        && is_smooth(s, (*st).ray.side, false);
 }
 
 fn sees_backdrop(st: ptr<function, PathState>) -> bool {

@@ -97,9 +97,9 @@ pub fn events_after(events: u32, depth: u32, side: u32, smooth: bool) -> u32 {
 }
 
 /// Whether light that comes by way of the vertex is the photons'. Where the camera first meets a surface, and on real ones, less blur makes it their
-/// landing place.
-pub fn is_smooth(s: &Surface, side: u32, is_first: bool) -> bool {
-    if is_first || side != SIDE_VIRTUAL {
+/// landing place; so does a photograph that shows through glass, which photons do not bring.
+pub fn is_smooth(frame: &Frame, s: &Surface, side: u32, is_first: bool) -> bool {
+    if is_first || side != SIDE_VIRTUAL || frame.flags & FRAME_BACKDROP != 0 {
         return bsdf_is_polished(s);
     }
     bsdf_is_glossy(s)
@@ -119,7 +119,7 @@ pub fn vertex_left_to_photons(scene: &PackedScene, st: &PathState, s: &Surface) 
         && st.path.mode == MODE_MIXED
         && st.ray.side == SIDE_VIRTUAL
         && st.path.events & (EVENT_SEEN | EVENT_REAL_CHAIN) == EVENT_SEEN
-        && bsdf_is_glossy(s)
+        && is_smooth(&scene.frame, s, st.ray.side, false)
 }
 
 /// Whether what the path sees of the world that is not modelled is what the photograph shows.

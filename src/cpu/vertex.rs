@@ -102,7 +102,7 @@ pub fn shade_vertex(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     }
     offer_point(scene, st, s);
 
-    if difference && is_smooth(s, st.ray.side, st.ray.depth == 1) {
+    if difference && is_smooth(&scene.frame, s, st.ray.side, st.ray.depth == 1) {
         st.path.events |= EVENT_AT_POLISHED;
     }
     let techniques = difference.then(|| techniques_at(scene, st, s, wo));
@@ -281,7 +281,12 @@ fn next_event(
     let mut l = light_sample(scene, index, s.position, u.pair());
     if scene.lights[index as usize].kind == LIGHT_ENVIRONMENT
         && sees_backdrop(scene, st)
-        && from_lens_after(st, s, false, is_smooth(s, st.ray.side, st.ray.depth == 1)) != 0
+        && from_lens_after(
+            st,
+            s,
+            false,
+            is_smooth(&scene.frame, s, st.ray.side, st.ray.depth == 1),
+        ) != 0
     {
         l.radiance = backdrop_radiance(scene, s.position, l.direction);
     }
@@ -521,7 +526,7 @@ fn plan_continuation(
         pass_straight(st, b.wi, throughput, medium);
         return;
     }
-    let smooth = b.delta || is_smooth(s, st.ray.side, st.ray.depth == 1);
+    let smooth = b.delta || is_smooth(&scene.frame, s, st.ray.side, st.ray.depth == 1);
     let mut events = st.path.events;
     if !straight {
         events = events_after(events, st.ray.depth, st.ray.side, smooth);

@@ -297,7 +297,7 @@ fn scatter(scene: &PackedScene, photon: &mut Photon, s: &Surface, wi: Vec3) -> b
         return false;
     }
     if !photon.landed && !straight {
-        if b.delta || is_smooth(s, photon.st.ray.side, false) {
+        if b.delta || is_smooth(&scene.frame, s, photon.st.ray.side, false) {
             // A smooth real surface on the way: the eye's paths bring that.
             if photon.st.ray.side == SIDE_REAL {
                 return false;

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::segments::Segment;
 
 /// Nothing is claimed that is less sure.
-const MOST_FOCAL_SIGMA: f64 = 0.1;
+const MOST_FOCAL_SIGMA: f64 = 0.08;
 const MOST_UP_SIGMA_DEG: f64 = 2.5;
 
 /// What was seen.
