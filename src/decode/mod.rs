@@ -21,7 +21,9 @@ pub use channels::ChannelFile;
 pub(crate) use file::{
     MAX_PICTURE_BYTES, MAX_POSES_BYTES, MAX_TEXT_BYTES, read_file, read_stream, read_text, text_of,
 };
-pub(crate) use jpeg::{jpegs_of_film, split_jpegs};
+#[cfg(feature = "cli")]
+pub(crate) use jpeg::jpegs_of_film;
+pub(crate) use jpeg::split_jpegs;
 pub(crate) use kind::{FileKind, film_kind, kind_of};
 pub use profile::ColourProfile;
 pub use tags::Tags;
