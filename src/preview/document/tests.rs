@@ -1,6 +1,6 @@
 use super::*;
 use crate::preview::composition::Track;
-use crate::scene::{Shutter, load_text};
+use crate::scene::load_text;
 
 const TEXT: &str = "\
 # my desk
@@ -151,12 +151,7 @@ fn keys_are_written_with_comments_and_order_kept() {
 
     let mut is = was.clone();
     assert!(is.shift_key(Track::Object(0), 2.0, 1.5));
-    is.shutter = Some(Shutter {
-        exposure_secs: 0.0,
-        readout_secs: 0.0,
-        samples: None,
-        time_secs: 1.0,
-    });
+    is.set_time(1.0);
     is.set_key(Track::Object(1));
     is.place(
         0,
@@ -218,24 +213,16 @@ fn keys_are_written_with_comments_and_order_kept() {
 fn an_object_turns_about_itself_between_two_keys() {
     let scene = load_text(Path::new("scene.toml"), TEXT).unwrap();
     let mut composition = Document::parse(TEXT).unwrap().composition(&scene);
-    let at = |composition: &mut Composition, time_secs: f64| {
-        composition.shutter = Some(Shutter {
-            exposure_secs: 0.0,
-            readout_secs: 0.0,
-            samples: None,
-            time_secs,
-        });
-    };
     let before = composition.placement(0);
     composition.set_key(Track::Object(0));
     assert_eq!(composition.placement(0), before);
-    at(&mut composition, 1.0);
+    composition.set_time(1.0);
     let turned = Placement {
         rotation: Rotation::EulerDeg(DVec3::new(0.0, 150.0, 0.0)),
         ..before
     };
     composition.place(0, turned);
-    at(&mut composition, 0.5);
+    composition.set_time(0.5);
     let between = composition.placement(0);
     assert_eq!(between.translation, before.translation);
     assert_eq!(
