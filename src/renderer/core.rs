@@ -36,6 +36,8 @@ pub(super) struct Core {
     pub coarse_photo: Option<Photo>,
     /// Of a draft: other exposures and cameras make do with it.
     pub photo_light: Option<PhotoLight>,
+    /// The same as the present camera sees it.
+    pub photo_here: Option<PhotoLight>,
     /// Share of the light of virtual pixels that comes from the photograph as their backdrop.
     pub backdrop_share: Option<f64>,
     /// The picture's time.

@@ -178,7 +178,8 @@ impl Renderer {
         self.core.scene.settings.max_bounces = max_bounces;
         self.core.packed.set_settings(&self.core.scene);
         self.core.pack_moving(watcher)?;
-        self.restart(true, Changed::All, watcher)
+        let is_exposed = self.expose_draft();
+        self.restart(!is_exposed, Changed::All, watcher)
     }
 
     /// Other camera stages. They work on what is delivered: the film stays, unless another way to show motion traces other rays.

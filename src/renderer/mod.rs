@@ -241,6 +241,7 @@ impl Renderer {
                 notes: Vec::new(),
                 coarse_photo: None,
                 photo_light: None,
+                photo_here: None,
                 backdrop_share: None,
                 is_planned: false,
                 secs_per_ray: None,

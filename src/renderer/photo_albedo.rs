@@ -104,10 +104,10 @@ pub fn estimate_photo_albedo(
 
 impl PhotoLight {
     /// The albedo of another exposure or camera, without a ray of light: for a draft. Light that comes from one part of the proxy to another stays
-    /// what it was, and what the first camera did not see lies in the mean light. False if the anchor is another.
-    pub fn take_up(&self, scene: &mut PackedScene, photo: &Photo) -> bool {
+    /// what it was, and what the first camera did not see lies in the mean light. What this camera sees; `None` if the anchor is another.
+    pub fn take_up(&self, scene: &mut PackedScene, photo: &Photo) -> Option<Self> {
         if self.anchor_m != scene.anchor_m {
-            return false;
+            return None;
         }
         let seen = first_surfaces(scene, 1, |flags| flags & MATERIAL_PHOTO_ALBEDO != 0);
         scene.photo_albedo = unknown_albedo(scene, &seen);
@@ -127,7 +127,7 @@ impl PhotoLight {
             light,
         };
         moved.set_albedo(scene, photo);
-        true
+        Some(moved)
     }
 
     /// `None` where the camera did not see the point.
@@ -144,8 +144,8 @@ impl PhotoLight {
         ((there - at.depth).abs() < DEPTH_TOLERANCE * at.depth).then(|| self.light[pixel])
     }
 
-    /// How many pixels' albedo had to be limited.
-    fn set_albedo(&self, scene: &mut PackedScene, photo: &Photo) -> usize {
+    /// The albedo at the scene's exposure; how many pixels' had to be limited.
+    pub fn set_albedo(&self, scene: &mut PackedScene, photo: &Photo) -> usize {
         let mut limited = 0;
         let scale = scene.frame.exposure_scale;
         let records = scene.photo_albedo.iter_mut().zip(&self.seen);

@@ -109,6 +109,7 @@ impl Renderer {
         }
         let from_photo = (core.packed.materials.iter())
             .any(|material| material.flags & MATERIAL_PHOTO_ALBEDO != 0);
+        core.photo_here = None;
         let coarse = core.coarse_photo.as_ref();
         let Some(photo) = photo_of_size(&core.scene, coarse, &core.packed.frame) else {
             return;
@@ -128,7 +129,8 @@ impl Renderer {
         }
         if from_photo {
             let kept = (core.photo_light.as_ref()).filter(|_| core.options.draft);
-            if kept.is_some_and(|light| light.take_up(&mut core.packed, photo)) {
+            core.photo_here = kept.and_then(|light| light.take_up(&mut core.packed, photo));
+            if core.photo_here.is_some() {
                 return;
             }
             let (light, limited) =
@@ -146,6 +148,21 @@ impl Renderer {
                     100.0 * limited
                 ));
             }
+        }
+    }
+
+    /// Of a draft, the albedo of another exposure by what the camera is known to see; false where all of it is to be prepared.
+    pub(super) fn expose_draft(&mut self) -> bool {
+        let core = &mut self.core;
+        let is_fixed = core.scene.settings.exposure != Exposure::Auto;
+        let coarse = core.coarse_photo.as_ref();
+        let photo = photo_of_size(&core.scene, coarse, &core.packed.frame);
+        match (&core.photo_here, photo) {
+            (Some(here), Some(photo)) if is_fixed => {
+                here.set_albedo(&mut core.packed, photo);
+                true
+            }
+            _ => false,
         }
     }
 

@@ -14,6 +14,8 @@ const COARSE_DIVISOR: u32 = 4;
 /// Where the coarse picture ends: with more the pilot would measure first, which takes longer than the first picture.
 const COARSE_RAYS: u32 = 7;
 
+/// Columns of the environment that lights the coarse picture: a table that stays in a core's cache.
+const COARSE_DIRECTIONS: u32 = 128;
 /// The coarse picture's indirect light is no brighter: one ray would show it as dots.
 const COARSE_CLAMP: f32 = 1.0;
 
@@ -166,12 +168,15 @@ fn set_camera(
     renderer.set_frame(edit, watcher)
 }
 
-/// A quarter of the width and height, the photograph averaged.
+/// A quarter of the width and height, photograph and environment averaged.
 fn shrink(scene: &mut Scene) {
     scene.camera = scene.camera.coarser(COARSE_DIVISOR);
     let (width, height) = (scene.camera.width, scene.camera.height);
     let photo = scene.photo.as_ref();
     scene.photo = photo.map(|photo| photo.averaged(width, height));
+    if let Some(environment) = &mut scene.environment {
+        environment.map = environment.map.averaged(COARSE_DIRECTIONS);
+    }
     if !scene.shutter.is_some_and(|shutter| shutter.is_open()) {
         rest(&mut scene.objects);
     }
