@@ -48,7 +48,7 @@ pub fn write_png(
         PngBits::Sixteen => {
             let encode = Encoding {
                 srgb: encode16,
-                of_share: |x| (x * 65535.0 + 0.5).floor() as u16,
+                of_share: |x: f64| (x * 65535.0 + 0.5).floor() as u16,
             };
             let code = code(photo, encode, |encoded, pixel| match encoded {
                 EncodedPhoto::Codes8(codes) => Some(codes[pixel].map(|c| u16::from(c) * 257)),
@@ -94,7 +94,7 @@ pub(crate) fn picture_codes8(picture: &Picture, photo: Option<&Photo>) -> Vec<[u
 pub(crate) fn code8(photo: Option<&Photo>) -> impl Fn(usize, [f32; 3]) -> [u8; 3] + Sync {
     let encode = Encoding {
         srgb: encode8,
-        of_share: |x| (x * 255.0 + 0.5).floor() as u8,
+        of_share: |x: f64| (x * 255.0 + 0.5).floor() as u8,
     };
     code(photo, encode, |encoded, pixel| match encoded {
         EncodedPhoto::Codes8(codes) => Some(codes[pixel]),
@@ -103,21 +103,21 @@ pub(crate) fn code8(photo: Option<&Photo>) -> impl Fn(usize, [f32; 3]) -> [u8; 3
 }
 
 /// Codes of linear values, and of encoded ones from 0 to 1.
-struct Encoding<T> {
-    srgb: fn(f32) -> T,
-    of_share: fn(f64) -> T,
+struct Encoding<S, O> {
+    srgb: S,
+    of_share: O,
 }
 
 /// In the photograph's colours; a pixel of the photograph's own value has its own code.
 fn code<T: Copy>(
     photo: Option<&Photo>,
-    encode: Encoding<T>,
+    encode: Encoding<impl Fn(f32) -> T + Sync, impl Fn(f64) -> T + Sync>,
     own_code: impl Fn(&EncodedPhoto, usize) -> Option<[T; 3]> + Sync,
 ) -> impl Fn(usize, [f32; 3]) -> [T; 3] + Sync {
     let profile = photo.and_then(|photo| photo.tags.profile.as_deref());
     let of_linear = move |value: [f32; 3]| match profile {
-        None => value.map(encode.srgb),
-        Some(profile) => profile.encoded(value).map(encode.of_share),
+        None => value.map(&encode.srgb),
+        Some(profile) => profile.encoded(value).map(&encode.of_share),
     };
     move |pixel, value| {
         photo

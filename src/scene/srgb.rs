@@ -99,11 +99,8 @@ impl Codes8 {
         if linear.is_nan() || linear <= 0.0 || bits < Self::FIRST_BITS {
             return 0;
         }
-        let mut code = self.least[((bits - Self::FIRST_BITS) >> Self::SHIFT) as usize];
-        while linear >= self.end[code as usize] {
-            code += 1;
-        }
-        code
+        let least = self.least[((bits - Self::FIRST_BITS) >> Self::SHIFT) as usize];
+        least + u8::from(linear >= self.end[least as usize])
     }
 }
 
