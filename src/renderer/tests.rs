@@ -3,8 +3,8 @@ use std::sync::{Arc, Mutex};
 use super::*;
 use crate::pack::{test_mesh, test_scene};
 use crate::scene::{
-    BackendChoice, EncodedPhoto, Environment, EnvironmentMap, Light, LightKind, Material, Photo,
-    Side,
+    BackendChoice, EncodedPhoto, Environment, EnvironmentMap, Exposure, Light, LightKind, Material,
+    Photo, Side,
 };
 
 #[test]
@@ -142,6 +142,27 @@ fn an_edited_draft_is_a_draft_of_the_edited_scene() {
     let after = shown(&mut edited);
     assert_eq!(after, shown(&mut new));
     assert_ne!(after, before, "control");
+}
+
+/// Of a draft, one exposure after another renders what the last one does alone, bit for bit. Control: another exposure.
+#[test]
+fn a_draft_is_exposed_anew_without_a_ray() {
+    let draft = RendererOptions {
+        draft: true,
+        ..RendererOptions::default()
+    };
+    let nobody = Watcher::none();
+    let exposed = |exposures: &[f64]| {
+        let mut renderer = Renderer::new(scene_with_a_photo(true), draft, &nobody).expect("fits");
+        for ev in exposures {
+            let bounces = renderer.scene().settings.max_bounces;
+            (renderer.set_transport(Exposure::Ev(*ev), bounces, &nobody)).expect("fits");
+        }
+        (renderer.advance(Budget::Rays(12), &nobody)).expect("renders");
+        bits(&renderer)
+    };
+    assert_eq!(exposed(&[0.5, -0.25, 0.2]), exposed(&[0.2]));
+    assert_ne!(exposed(&[0.5]), exposed(&[0.2]), "control");
 }
 
 /// Each bit of the film's sums.

@@ -52,6 +52,25 @@ pub fn encode8(linear: f32) -> u8 {
     CODES.of(linear)
 }
 
+/// What hardly differs from a photograph's 8-bit code keeps it: half a code is what rounding hides anyway, and the rest is what noise may then be off
+/// without a change of code.
+pub const KEPT_CODES: f64 = 0.7;
+
+/// The code, if the value lies within [`KEPT_CODES`] of it, else [`encode8`]'s.
+pub fn encode8_near(linear: f32, code: u8) -> u8 {
+    static KEPT: LazyLock<[[f32; 2]; 256]> = LazyLock::new(|| {
+        std::array::from_fn(|code| {
+            let bound = |side: f64| ((code as f64 + side * KEPT_CODES) / 255.0).clamp(0.0, 1.0);
+            [-1.0, 1.0].map(|side| decode(bound(side)) as f32)
+        })
+    });
+    let [low, high] = KEPT[code as usize];
+    match low < linear && linear < high {
+        true => code,
+        false => encode8(linear),
+    }
+}
+
 /// The 8-bit codes by a look at a few of them, where a power takes ten times as long.
 struct Codes8 {
     /// By the upper bits of a value from 2^-13 to 1: the code of the least such value.

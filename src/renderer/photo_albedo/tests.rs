@@ -194,11 +194,16 @@ fn light_that_was_found_serves_another_exposure_and_camera() {
     let mut exact = build(glam::DVec3::ZERO);
     estimate_photo_albedo(&mut exact, &photo, &Watcher::none());
     assert!(mean_error(&packed, &exact) > 0.1, "control");
-    assert!(light.take_up(&mut packed, &photo));
+    let here = light.take_up(&mut packed, &photo).expect("the same anchor");
     let error = mean_error(&packed, &exact);
     assert!(error < 0.02, "{error}");
-    assert!(
-        !light.take_up(&mut build(glam::DVec3::X), &photo),
-        "another anchor"
-    );
+    let (taken, before) = (packed.photo_albedo.clone(), packed.frame.exposure_scale);
+    packed.frame.exposure_scale *= 3.0;
+    here.set_albedo(&mut packed, &photo);
+    assert_ne!(packed.photo_albedo, taken, "control");
+    packed.frame.exposure_scale = before;
+    here.set_albedo(&mut packed, &photo);
+    assert_eq!(packed.photo_albedo, taken);
+    let elsewhere = light.take_up(&mut build(glam::DVec3::X), &photo);
+    assert!(elsewhere.is_none(), "another anchor");
 }
