@@ -32,8 +32,8 @@ const SQUARE: f64 = 0.003;
 const ANY_RECTANGLE: f64 = 0.5;
 /// Of it, what still counts as square.
 const MOST_OFF_SQUARE: f64 = 0.02;
-/// By what squares that lie apart are off equal ones, of a side: by their print, and by how bent paper leans. Those of the markers' video are, where the
-/// sheet is solved for from all of its frames. What belongs to one board is one.
+/// By what squares that lie apart are off equal ones, of a side: those of the markers' video lean by 0.0086 and differ by 0.003 to 0.005 in size, as
+/// `mixray track` solves for their sheet. What belongs to one board is one.
 const UNEQUAL: f64 = 0.009;
 const OF_ONE_BOARD: f64 = 1e-5;
 /// Parameters that all corners share: the logarithm of the focal length, the bend, the centre, the plane's turn, the logarithm of the sides' length,
@@ -454,7 +454,7 @@ mod tests {
     fn squares_that_are_not_quite_equal_leave_the_focal_length_as_open_as_is_said() {
         let (own, as_equal) = (rms_off(UNEQUAL), rms_off(OF_ONE_BOARD));
         assert!((0.5..1.2).contains(&own), "{own}");
-        assert!(as_equal > 1.5 * own, "control: {as_equal} {own}");
+        assert!(as_equal > 1.3 * own, "control: {as_equal} {own}");
     }
 
     #[test]
@@ -465,7 +465,7 @@ mod tests {
             own += 0.1 * fit.sigma * UNIT_PX;
             as_if_free += 0.1 * fit.spread(0.0) * UNIT_PX;
         }
-        assert!((0.25..0.36).contains(&own), "{own}");
-        assert!(as_if_free < 0.22, "control: {as_if_free}");
+        assert!((0.23..0.34).contains(&own), "{own}");
+        assert!(as_if_free < 0.2, "control: {as_if_free}");
     }
 }
