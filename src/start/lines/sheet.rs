@@ -10,8 +10,8 @@ use super::segments::{Grey, Segment};
 use super::squares::{Patch, find_boards, find_dark_squares};
 use super::told::{Basis, Lines};
 
-/// Of a corner, pixels: no camera and no sheet of paper is better.
-const LEAST_SIGMA_PX: f64 = 0.25;
+/// Of a corner, pixels: of no photograph are they better.
+const LEAST_SIGMA_PX: f64 = 0.1;
 /// Corners are no further off, of a square's side.
 const MOST_OFF: f64 = 0.03;
 const LEAST_SHARE: f64 = 0.85;
