@@ -113,11 +113,12 @@ impl GpuBackend {
     /// As [`GpuBackend::new`].
     pub fn update_scene(&mut self, scene: &PackedScene, changed: Changed) -> Result<(), GpuError> {
         let parts = SceneParts::from(scene);
-        if !self.scene.update(&self.gpu, &parts, changed) {
-            self.scene = SceneBuffers::from_parts(&self.gpu, &parts)?;
+        if self.scene.update(&self.gpu, &parts, changed)? {
             // Bind groups name the old buffers.
             self.groups.clear();
-            self.photons = None;
+            if let Some(photons) = &mut self.photons {
+                photons.bind(&self.gpu, &self.scene)?;
+            }
         }
         let features = Features::wanted(scene, self.specialised);
         if features != self.features {
@@ -131,7 +132,12 @@ impl GpuBackend {
         let kept = (self.parked.iter()).position(|parked| parked.features == features);
         let kernels = match kept {
             Some(kept) => self.parked.swap_remove(kept).kernels,
-            None => compile(&self.gpu, &Composer::default(), &features)?,
+            None => {
+                let begun = self.places.begin();
+                let kernels = compile(&self.gpu, &Composer::default(), &features)?;
+                self.places.end(Place::Kernels, begun);
+                kernels
+            }
         };
         let before = Parked {
             features: std::mem::replace(&mut self.features, features),
@@ -280,12 +286,13 @@ impl GpuBackend {
     ) -> Result<(), GpuError> {
         let photons = match &mut self.photons {
             Some(photons) => photons,
-            none => none.insert(Photons::new(
-                &self.gpu,
-                &Composer::default(),
-                &self.features,
-                &self.scene,
-            )?),
+            none => {
+                let begun = self.places.begin();
+                let made =
+                    Photons::new(&self.gpu, &Composer::default(), &self.features, &self.scene)?;
+                self.places.end(Place::Kernels, begun);
+                none.insert(made)
+            }
         };
         photons.render(&self.gpu, film, work, rays, &mut self.places, watcher)
     }
