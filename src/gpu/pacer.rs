@@ -12,8 +12,8 @@ const TELLING_STEPS: f64 = 1000.0;
 const FILLED: f64 = 0.6;
 /// Lanes of the first batch, and of the least.
 const LEAST_LANES: usize = 4096;
-/// Above this more lanes bring no speed, but cost memory.
-const MOST_LANES: usize = 1 << 19;
+/// Above this more lanes bring no speed, but cost memory; up to it, each batch that is saved saves the host its steps.
+const MOST_LANES: usize = 1 << 21;
 /// Batches grow by no more than this at a time.
 const GROWTH: usize = 8;
 /// Seconds that any dispatch takes, however few its lanes, before one was measured.
@@ -67,8 +67,14 @@ impl Pacer {
         }
     }
 
-    /// Lanes that the next batch may have: one step of all of them fills a submission.
-    pub fn lanes(&mut self) -> usize {
+    /// Lanes that the next batch of so many samples may have: one step of all of them fills a submission.
+    pub fn lanes_for(&mut self, samples: u64) -> usize {
+        let of_all = usize::try_from(samples).unwrap_or(usize::MAX);
+        self.lanes().min(of_all.max(LEAST_LANES))
+    }
+
+    /// The same of as many as there are.
+    fn lanes(&mut self) -> usize {
         if let Some(secs) = self.secs_per_step {
             let affordable = ((FILLED * self.longest_secs / secs) as usize).min(self.most_lanes);
             let least = LEAST_LANES.min(self.most_lanes);
@@ -191,6 +197,15 @@ mod tests {
             MOST_LANES,
             "fast devices get large batches"
         );
+        let mut fast = Pacer::new(usize::MAX, false);
+        let load = Load {
+            lane_steps: 1e9,
+            dispatches: 3,
+        };
+        fast.record(Duration::from_millis(1), load);
+        let lanes: Vec<usize> = (0..5).map(|_| fast.lanes_for(100_000)).collect();
+        assert_eq!(lanes, [32_768, 100_000, 100_000, 100_000, 100_000]);
+        assert_eq!(fast.lanes_for(10), LEAST_LANES);
     }
 
     #[test]

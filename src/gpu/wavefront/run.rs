@@ -139,9 +139,10 @@ impl GpuBackend {
         slots: &Slots,
         mut before: wgpu::CommandEncoder,
     ) -> Result<(), GpuError> {
+        let samples = work.iter().map(|work| u64::from(work.samples())).sum();
         let mut cursor = Cursor::default();
         loop {
-            let lanes = self.pacer.lanes();
+            let lanes = self.pacer.lanes_for(samples);
             let lane_count = self.prepare_lanes(lanes)?;
             let Some(lanes) = self.lanes.take() else {
                 return Err(GpuError::Lost("no room for samples".to_owned()));
