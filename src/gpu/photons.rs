@@ -122,6 +122,11 @@ impl Photons {
         Ok(())
     }
 
+    /// Holds on to no scene's buffers any more; [`Photons::bind`] comes before the next photons.
+    pub fn unbind(&mut self) {
+        self.groups.clear();
+    }
+
     /// Traces the photons of `work` and adds what they bring to the film, as [`crate::cpu::photons::render::render`] does.
     ///
     /// # Errors

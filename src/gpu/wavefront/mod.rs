@@ -60,6 +60,7 @@ pub struct GpuBackend {
 struct Parked {
     features: Features,
     kernels: Vec<Kernel>,
+    photons: Option<Photons>,
 }
 
 fn compile(
@@ -124,24 +125,37 @@ impl GpuBackend {
         if features != self.features {
             self.change_features(features)?;
         }
-        Ok(())
+        match scene.photons_per_ray {
+            0 => Ok(()),
+            _ => self.prepare_photons(),
+        }
     }
 
     /// Takes other kernels, compiled now or kept from before: a video goes back and forth between moving and resting.
     fn change_features(&mut self, features: Features) -> Result<(), GpuError> {
         let kept = (self.parked.iter()).position(|parked| parked.features == features);
-        let kernels = match kept {
-            Some(kept) => self.parked.swap_remove(kept).kernels,
+        let (kernels, mut photons) = match kept {
+            Some(kept) => {
+                let parked = self.parked.swap_remove(kept);
+                (parked.kernels, parked.photons)
+            }
             None => {
                 let begun = self.places.begin();
                 let kernels = compile(&self.gpu, &Composer::default(), &features)?;
                 self.places.end(Place::Kernels, begun);
-                kernels
+                (kernels, None)
             }
         };
+        if let Some(photons) = &mut photons {
+            photons.bind(&self.gpu, &self.scene)?;
+        }
+        if let Some(photons) = &mut self.photons {
+            photons.unbind();
+        }
         let before = Parked {
             features: std::mem::replace(&mut self.features, features),
             kernels: std::mem::replace(&mut self.kernels, kernels),
+            photons: std::mem::replace(&mut self.photons, photons),
         };
         self.parked.push(before);
         let state_parts = state_parts(&self.kernels);
@@ -152,7 +166,6 @@ impl GpuBackend {
         }
         self.groups.clear();
         self.courses = Default::default();
-        self.photons = None;
         self.warm = false;
         Ok(())
     }
@@ -284,17 +297,21 @@ impl GpuBackend {
         rays: &mut RayCounts,
         watcher: &Watcher<'_>,
     ) -> Result<(), GpuError> {
-        let photons = match &mut self.photons {
-            Some(photons) => photons,
-            none => {
-                let begun = self.places.begin();
-                let made =
-                    Photons::new(&self.gpu, &Composer::default(), &self.features, &self.scene)?;
-                self.places.end(Place::Kernels, begun);
-                none.insert(made)
-            }
-        };
+        self.prepare_photons()?;
+        let photons = self.photons.as_mut().expect("they are prepared");
         photons.render(&self.gpu, film, work, rays, &mut self.places, watcher)
+    }
+
+    /// Compiles the photons' kernel, unless it is there.
+    fn prepare_photons(&mut self) -> Result<(), GpuError> {
+        if self.photons.is_none() {
+            let begun = self.places.begin();
+            let composer = Composer::default();
+            let made = Photons::new(&self.gpu, &composer, &self.features, &self.scene)?;
+            self.photons = Some(made);
+            self.places.end(Place::Kernels, begun);
+        }
+        Ok(())
     }
 
     /// Makes room for so many pixels.
