@@ -66,31 +66,33 @@ pub(super) fn depth(tree: &Bvh2) -> usize {
 
 /// Boxes of the triangles, enlarged by one to three times the bound that the triangle test needs. The varying part keeps identical
 /// triangles from looking equally near to PLOC, which then would merge one pair at a time into a chain.
-pub(super) fn padded_boxes(triangles: &[[Vec3; 3]]) -> Vec<Aabb> {
-    triangles
-        .iter()
-        .enumerate()
-        .map(|(index, [a, b, c])| {
-            let low = a.min(*b).min(*c);
-            let high = a.max(*b).max(*c);
-            let extent = (high - low).max_element();
-            let bits = scramble(index as u64);
-            let pad = |slot: u32| {
-                let unit = ((bits >> (10 * slot)) & 1023) as f32 / 1024.0;
-                extent * PAD * (1.0 + 2.0 * unit)
-            };
-            let outward = |low: f32, high: f32, axis: u32| {
-                (
-                    (low - pad(2 * axis)).next_down(),
-                    (high + pad(2 * axis + 1)).next_up(),
-                )
-            };
-            let (x0, x1) = outward(low.x, high.x, 0);
-            let (y0, y1) = outward(low.y, high.y, 1);
-            let (z0, z1) = outward(low.z, high.z, 2);
-            Aabb::new(Vec3A::new(x0, y0, z0), Vec3A::new(x1, y1, z1))
-        })
+fn padded_boxes(triangles: &[[Vec3; 3]]) -> Vec<Aabb> {
+    (0..triangles.len())
+        .map(|index| padded_box(triangles, index))
         .collect()
+}
+
+/// One of [`padded_boxes`].
+pub(super) fn padded_box(triangles: &[[Vec3; 3]], index: usize) -> Aabb {
+    let [a, b, c] = triangles[index];
+    let low = a.min(b).min(c);
+    let high = a.max(b).max(c);
+    let extent = (high - low).max_element();
+    let bits = scramble(index as u64);
+    let pad = |slot: u32| {
+        let unit = ((bits >> (10 * slot)) & 1023) as f32 / 1024.0;
+        extent * PAD * (1.0 + 2.0 * unit)
+    };
+    let outward = |low: f32, high: f32, axis: u32| {
+        (
+            (low - pad(2 * axis)).next_down(),
+            (high + pad(2 * axis + 1)).next_up(),
+        )
+    };
+    let (x0, x1) = outward(low.x, high.x, 0);
+    let (y0, y1) = outward(low.y, high.y, 1);
+    let (z0, z1) = outward(low.z, high.z, 2);
+    Aabb::new(Vec3A::new(x0, y0, z0), Vec3A::new(x1, y1, z1))
 }
 
 /// SplitMix64's finaliser.

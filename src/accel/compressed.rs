@@ -4,6 +4,7 @@
 //! what then does not fit; with an outlier a million times larger than the rest its boxes lose triangles. Here cells are found in f64 and
 //! widened by its rounding, so that a decompressed box contains its triangles exactly. What the shader's own arithmetic adds is bounded there.
 
+use std::ops::Range;
 use std::sync::LazyLock;
 
 use glam::{DVec3, Vec3};
@@ -13,7 +14,7 @@ use obvhs::{
     cwbvh::{bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode},
 };
 
-use super::binary::padded_boxes;
+use super::binary::padded_box;
 
 /// Levels that the shader's stack serves.
 pub(super) const MAX_LEVELS: usize = 24;
@@ -33,9 +34,29 @@ pub(super) struct CompressedBvh {
     pub(super) leaves: Vec<[f32; 4]>,
     /// Nodes on the longest path.
     pub(super) levels: u32,
-    /// Around all triangles, enlarged; `None` without any.
-    bounds: Option<Aabb>,
+    /// Around the triangles of each node, enlarged; none without any.
+    boxes: Vec<Aabb>,
     place: Place,
+    /// By the last refit; `None` before one.
+    pub(super) refitted: Option<Refitted>,
+}
+
+/// Records that a refit changed, in ascending order.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Refitted {
+    /// Of the nodes below the root.
+    pub nodes: Vec<Range<usize>>,
+    /// Three records a triangle.
+    pub leaves: Vec<Range<usize>>,
+}
+
+/// Adds records after those that are there; short gaps are filled, so that few ranges are left.
+fn add_range(ranges: &mut Vec<Range<usize>>, more: Range<usize>) {
+    const LONGEST_GAP: usize = 16;
+    match ranges.last_mut() {
+        Some(last) if more.start <= last.end + LONGEST_GAP => last.end = more.end,
+        _ => ranges.push(more),
+    }
 }
 
 /// Where in a world's arrays the nodes below a tree's root and its triangles stand.
@@ -66,8 +87,8 @@ impl Place {
 
 /// A root over two trees at their places, and their roots. Where one has no triangles the other's root is the root, and the rest unused.
 pub(super) fn join(first: &CompressedBvh, second: &CompressedBvh) -> [Node; ROOTS as usize] {
-    let (a, b) = match (first.bounds, second.bounds) {
-        (Some(a), Some(b)) => (a, b),
+    let (a, b) = match (first.boxes.first(), second.boxes.first()) {
+        (Some(&a), Some(&b)) => (a, b),
         (None, Some(_)) => return [second.nodes[0]; ROOTS as usize],
         (_, None) => return [first.nodes[0]; ROOTS as usize],
     };
@@ -91,8 +112,9 @@ impl CompressedBvh {
             nodes: vec![[[0; 4]; 5]],
             leaves: Vec::new(),
             levels: 1,
-            bounds: None,
+            boxes: Vec::new(),
             place: Place::FIRST,
+            refitted: None,
         }
     }
 
@@ -156,45 +178,67 @@ impl CompressedBvh {
             nodes: bytemuck::cast_slice(nodes).to_vec(),
             leaves,
             levels: levels as u32,
-            bounds: node_boxes.first().copied(),
+            boxes: node_boxes,
             place,
+            refitted: None,
         })
     }
 
-    /// Moves the triangles, of which there are as many as before; the tree keeps its shape.
-    pub(super) fn refit(&mut self, triangles: &[[Vec3; 3]], first_id: u32) {
-        let enlarged = padded_boxes(triangles);
-        let mut ids = Vec::with_capacity(triangles.len());
-        for leaf in self.leaves.chunks_exact_mut(3) {
-            let id = leaf[0][3].to_bits() - first_id;
-            for (row, corner) in leaf.iter_mut().zip(triangles[id as usize]) {
-                row[..3].copy_from_slice(&corner.to_array());
+    /// Those of the triangles whose numbers are in `moved` have moved; the tree keeps its shape.
+    pub(super) fn refit(&mut self, triangles: &[[Vec3; 3]], first_id: u32, moved: &Range<usize>) {
+        let mut refitted = Refitted::default();
+        let number = |leaf: &[[f32; 4]]| (leaf[0][3].to_bits() - first_id) as usize;
+        for (index, leaf) in self.leaves.chunks_exact_mut(3).enumerate() {
+            let triangle = number(leaf);
+            if moved.contains(&triangle) {
+                for (row, corner) in leaf.iter_mut().zip(triangles[triangle]) {
+                    row[..3].copy_from_slice(&corner.to_array());
+                }
+                add_range(&mut refitted.leaves, 3 * index..3 * index + 3);
             }
-            ids.push(id);
-        }
-        if ids.is_empty() {
-            return;
         }
         let nodes: &mut [CwBvhNode] = bytemuck::cast_slice_mut(&mut self.nodes);
-        let mut node_boxes = vec![Aabb::empty(); nodes.len()];
+        let leaves = &self.leaves;
+        let mut touched = vec![false; self.boxes.len()];
         // Children stand after their parents.
-        for index in (0..nodes.len()).rev() {
+        for index in (0..self.boxes.len()).rev() {
             let node = CwBvhNode {
                 child_base_idx: nodes[index].child_base_idx - (self.place.node - 1),
                 primitive_base_idx: nodes[index].primitive_base_idx - self.place.triangle,
                 ..nodes[index]
             };
+            let held = |leaf: Range<usize>| {
+                leaves[3 * leaf.start..3 * leaf.end]
+                    .chunks_exact(3)
+                    .map(number)
+            };
+            touched[index] = (0..8).any(|slot| match child(&node, slot) {
+                Child::None => false,
+                Child::Node(child) => touched[child],
+                Child::Leaf(range) => held(range).any(|triangle| moved.contains(&triangle)),
+            });
+            if !touched[index] {
+                continue;
+            }
             let boxes = std::array::from_fn(|slot| match child(&node, slot) {
                 Child::None => None,
-                Child::Node(child) => Some(node_boxes[child]),
-                Child::Leaf(range) => ids[range]
-                    .iter()
-                    .map(|&id| enlarged[id as usize])
+                Child::Node(child) => Some(self.boxes[child]),
+                Child::Leaf(range) => held(range)
+                    .map(|triangle| padded_box(triangles, triangle))
                     .reduce(|a, b| a.union(&b)),
             });
-            node_boxes[index] = compress(&mut nodes[index], &boxes);
+            self.boxes[index] = compress(&mut nodes[index], &boxes);
         }
-        self.bounds = node_boxes.first().copied();
+        // The root is sent by itself.
+        for (index, _) in touched
+            .iter()
+            .skip(1)
+            .enumerate()
+            .filter(|(_, touched)| **touched)
+        {
+            add_range(&mut refitted.nodes, index..index + 1);
+        }
+        self.refitted = Some(refitted);
     }
 }
 
@@ -249,7 +293,7 @@ fn compress(node: &mut CwBvhNode, boxes: &[Option<Aabb>; 8]) -> Aabb {
     for axis in 0..3 {
         let exponent = cell_exponent(size[axis]);
         node.e[axis] = exponent as u8;
-        let cell = f64::from(exponent - 127).exp2();
+        let cell = cell_size(exponent);
         for (slot, child_box) in boxes.iter().enumerate() {
             let Some(child_box) = child_box else { continue };
             low[axis][slot] = cell_below(offset_of(child_box.min)[axis], cell);
@@ -274,9 +318,15 @@ fn cell_above(offset: f64, cell: f64) -> f64 {
 
 /// Biased exponent of the smallest power of two of which 255 cover `size`.
 fn cell_exponent(size: f64) -> i32 {
-    let mut exponent = LEAST_EXPONENT;
-    while cell_above(size, f64::from(exponent - 127).exp2()) > 255.0 {
+    // 255 cells of 2^(n - 8) cover less than 2^n.
+    let power = (size.to_bits() >> 52) as i32 - 1023;
+    let mut exponent = LEAST_EXPONENT.max(power - 7 + 127);
+    while cell_above(size, cell_size(exponent)) > 255.0 {
         exponent += 1;
     }
     exponent
+}
+
+fn cell_size(exponent: i32) -> f64 {
+    f64::from_bits(((exponent - 127 + 1023) as u64) << 52)
 }

@@ -34,9 +34,10 @@ use glam::Vec3;
 use thiserror::Error;
 
 use crate::shared::NONE;
+pub use compressed::Refitted;
 use compressed::{CompressedBvh, Place};
 use kernel::Kernel;
-pub use spheres::Cover;
+pub use spheres::{Cover, Mesh};
 pub use trace::Hit;
 use tree::Tree;
 
@@ -118,8 +119,21 @@ impl WorldBvh {
     /// # Errors
     /// As [`WorldBvh::build`].
     pub fn refit(&mut self, triangles: &[[Vec3; 3]]) -> Result<bool, AccelError> {
+        let fits = triangles.len() == self.resting.len();
+        if fits {
+            self.refit_part(0, triangles)?;
+        }
+        Ok(fits)
+    }
+
+    /// [`WorldBvh::refit`] where only `triangles` move, those that rest from number `first` on: nothing else is touched but the boxes around them.
+    /// Panics if there are not so many.
+    ///
+    /// # Errors
+    /// As [`WorldBvh::build`].
+    pub fn refit_part(&mut self, first: usize, triangles: &[[Vec3; 3]]) -> Result<(), AccelError> {
         self.roots = OnceLock::new();
-        self.resting.refit(triangles)
+        self.resting.refit(first, triangles)
     }
 
     /// Triangles have come so far by [`WorldBvh::refit`] that rays would be faster in a tree built anew.
@@ -181,6 +195,12 @@ impl WorldBvh {
         let [resting, moving] = self.compressed();
         let roots = self.roots.get_or_init(|| compressed::join(resting, moving));
         [roots, &resting.nodes[1..], &moving.nodes[1..]]
+    }
+
+    /// What the last refit changed of the second of [`WorldBvh::gpu_nodes`], and of the first of [`WorldBvh::gpu_leaves`]. `None`: all of them are
+    /// new.
+    pub fn gpu_refitted(&self) -> Option<&Refitted> {
+        self.resting.refitted()
     }
 
     /// Triangles in the order of the GPU's leaves, what rests and what moves, three vec4<f32> each: the vertices, w of the first holding the

@@ -1,7 +1,5 @@
 //! Few spheres that contain all triangles.
 
-use std::collections::HashMap;
-
 use glam::{DVec3, Vec3};
 
 /// A split must take at least this share off the summed squares of the radii.
@@ -10,58 +8,113 @@ const LEAST_GAIN: f64 = 0.15;
 const BINS: usize = 16;
 /// Passes of the centre's walk towards the farthest point.
 const WALK_STEPS: usize = 64;
+/// Points that share a box: neighbours in their mesh.
+const IN_A_BOX: usize = 32;
 
-/// Triangles whose corners know which of them lie at one point.
-struct Mesh {
+/// Triangles over points that they share.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Metres; no harm is done by two that are equal, or by some that no triangle has.
+    pub points: Vec<Vec3>,
     /// Indices of points.
-    triangles: Vec<[u32; 3]>,
-    points: Vec<DVec3>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// What is looked up of a mesh while it is split.
+struct Parts<'a> {
+    mesh: &'a Mesh,
+    /// By triangle: the middle of its corners, and its box.
+    centers: Vec<DVec3>,
+    boxes: Vec<(Vec3, Vec3)>,
     /// By point, the last cluster that it was counted for.
     counted: Vec<u32>,
     /// Clusters so far.
     clusters: u32,
 }
 
-impl Mesh {
-    fn new(corners: &[[Vec3; 3]]) -> Self {
-        let mut known = HashMap::new();
-        let mut points = Vec::new();
-        let triangles = corners.iter().map(|triangle| {
-            triangle.map(|corner| {
-                *known
-                    .entry(corner.to_array().map(f32::to_bits))
-                    .or_insert_with(|| {
-                        points.push(corner.as_dvec3());
-                        points.len() as u32 - 1
-                    })
-            })
-        });
-        let triangles = triangles.collect();
+impl<'a> Parts<'a> {
+    fn of(mesh: &'a Mesh) -> Self {
+        let corners = |triangle: &[u32; 3]| triangle.map(|point| mesh.points[point as usize]);
+        let center = |triangle: &[u32; 3]| {
+            let corners = corners(triangle).map(Vec3::as_dvec3);
+            corners.into_iter().sum::<DVec3>() / 3.0
+        };
+        let box_of = |triangle: &[u32; 3]| {
+            let [a, b, c] = corners(triangle);
+            (a.min(b).min(c), a.max(b).max(c))
+        };
         Self {
-            triangles,
-            counted: vec![0; points.len()],
-            points,
+            mesh,
+            centers: mesh.triangles.iter().map(center).collect(),
+            boxes: mesh.triangles.iter().map(box_of).collect(),
+            counted: vec![0; mesh.points.len()],
             clusters: 0,
         }
     }
 
-    fn corners(&self, triangle: u32) -> [DVec3; 3] {
-        self.triangles[triangle as usize].map(|point| self.points[point as usize])
-    }
-
     /// The points of some triangles, each once: most corners are those of several triangles.
-    fn points_of(&mut self, triangles: &[u32]) -> Vec<DVec3> {
+    fn points_of(&mut self, triangles: &[u32]) -> Cloud {
         self.clusters += 1;
         let mut points = Vec::new();
         for triangle in triangles {
-            for point in self.triangles[*triangle as usize] {
+            for point in self.mesh.triangles[*triangle as usize] {
                 if self.counted[point as usize] != self.clusters {
                     self.counted[point as usize] = self.clusters;
-                    points.push(self.points[point as usize]);
+                    points.push(self.mesh.points[point as usize].as_dvec3());
                 }
             }
         }
-        points
+        Cloud::of(points)
+    }
+}
+
+/// Points in boxes, so that few of them are looked at for the farthest.
+struct Cloud {
+    points: Vec<DVec3>,
+    /// Of each [`IN_A_BOX`] of them: least and largest coordinates.
+    boxes: Vec<(DVec3, DVec3)>,
+}
+
+impl Cloud {
+    fn of(points: Vec<DVec3>) -> Self {
+        let box_of = |points: &[DVec3]| {
+            let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            let wider =
+                |(low, high): (DVec3, DVec3), point: &DVec3| (low.min(*point), high.max(*point));
+            points.iter().fold(start, wider)
+        };
+        Self {
+            boxes: points.chunks(IN_A_BOX).map(box_of).collect(),
+            points,
+        }
+    }
+
+    fn bounds(&self) -> (DVec3, DVec3) {
+        let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let wider =
+            |(low, high): (DVec3, DVec3), of: &(DVec3, DVec3)| (low.min(of.0), high.max(of.1));
+        self.boxes.iter().fold(start, wider)
+    }
+
+    /// Squared distance and index of the point farthest from `center`, the first of equally far ones. `guess`: a point that may be it.
+    fn farthest(&self, center: DVec3, guess: usize) -> (f64, usize) {
+        let mut worst = (self.points[guess].distance_squared(center), guess);
+        for (index, (low, high)) in self.boxes.iter().enumerate() {
+            // Rounding keeps the order of numbers: no point of the box is found farther than this.
+            let reach = (*low - center).abs().max((*high - center).abs());
+            if reach.length_squared() < worst.0 {
+                continue;
+            }
+            let first = index * IN_A_BOX;
+            let end = self.points.len().min(first + IN_A_BOX);
+            for (point, at) in self.points[first..end].iter().zip(first..) {
+                let squared = point.distance_squared(center);
+                if squared > worst.0 || (squared == worst.0 && at < worst.1) {
+                    worst = (squared, at);
+                }
+            }
+        }
+        worst
     }
 }
 
@@ -92,20 +145,20 @@ struct Split {
 impl Cover {
     /// Splits the cluster whose split saves most of the sum of squared radii, which is what the cones towards the spheres cover, until none
     /// saves enough, or there are `max` spheres.
-    pub fn of(mesh: &[[Vec3; 3]], max: usize) -> Cover {
+    pub fn of(mesh: &Mesh, max: usize) -> Cover {
         let mut cover = Cover {
             whole: None,
             splits: Vec::new(),
         };
-        if mesh.is_empty() {
+        if mesh.triangles.is_empty() {
             return cover;
         }
-        let mesh = &mut Mesh::new(mesh);
+        let lookup = &mut Parts::of(mesh);
         let all = (0..mesh.triangles.len() as u32).collect();
-        let mut clusters = vec![Cluster::new(mesh, all)];
+        let mut clusters = vec![Cluster::new(lookup, all)];
         cover.whole = Some(clusters[0].rounded());
         if max > 1 {
-            clusters[0].find_split(mesh);
+            clusters[0].find_split(lookup);
         }
         while clusters.len() < max {
             let best = clusters
@@ -125,8 +178,8 @@ impl Cover {
                 parts: [a.rounded(), b.rounded()],
                 gain,
             });
-            a.find_split(mesh);
-            b.find_split(mesh);
+            a.find_split(lookup);
+            b.find_split(lookup);
             clusters.extend([a, b]);
         }
         cover
@@ -179,23 +232,14 @@ impl Cover {
 }
 
 impl Cluster {
-    fn new(mesh: &mut Mesh, triangles: Vec<u32>) -> Cluster {
-        let points = mesh.points_of(&triangles);
-        let mut low = DVec3::INFINITY;
-        let mut high = DVec3::NEG_INFINITY;
-        for &point in &points {
-            low = low.min(point);
-            high = high.max(point);
-        }
-        let farthest = |center: DVec3| {
-            let mut worst = (0.0, center);
-            for &point in &points {
-                let squared = point.distance_squared(center);
-                if squared > worst.0 {
-                    worst = (squared, point);
-                }
-            }
-            (worst.0.sqrt(), worst.1)
+    fn new(parts: &mut Parts<'_>, triangles: Vec<u32>) -> Cluster {
+        let cloud = parts.points_of(&triangles);
+        let (low, high) = cloud.bounds();
+        let mut guess = 0;
+        let mut farthest = |center: DVec3| {
+            let squared;
+            (squared, guess) = cloud.farthest(center, guess);
+            (squared.sqrt(), cloud.points[guess])
         };
         // Badoiu and Clarkson 2003: steps of 1/(i + 1) towards the farthest point converge to the smallest sphere.
         let mut walk = 0.5 * (low + high);
@@ -229,38 +273,33 @@ impl Cluster {
     }
 
     /// Finds the best split by the surface area heuristic on the triangles' centres, and keeps it if it gains enough.
-    fn find_split(&mut self, mesh: &mut Mesh) {
-        let centers: Vec<DVec3> = self
-            .triangles
-            .iter()
-            .map(|&t| mesh.corners(t).into_iter().sum::<DVec3>() / 3.0)
-            .collect();
-        let (low, high) = centers
-            .iter()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &c| {
-                (low.min(c), high.max(c))
-            });
+    fn find_split(&mut self, parts: &mut Parts<'_>) {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for &triangle in &self.triangles {
+            let center = parts.centers[triangle as usize];
+            (low, high) = (low.min(center), high.max(center));
+        }
         let mut best = (f64::INFINITY, 0, 0.0);
         for axis in 0..3 {
             let width = (high[axis] - low[axis]) / BINS as f64;
             if width <= 0.0 {
                 continue;
             }
-            let mut bins = [(DVec3::INFINITY, DVec3::NEG_INFINITY); BINS];
-            for (&triangle, center) in self.triangles.iter().zip(&centers) {
-                let bin = (((center[axis] - low[axis]) / width) as usize).min(BINS - 1);
-                for corner in mesh.corners(triangle) {
-                    bins[bin] = (bins[bin].0.min(corner), bins[bin].1.max(corner));
-                }
+            let mut bins = [(Vec3::INFINITY, Vec3::NEG_INFINITY); BINS];
+            for &triangle in &self.triangles {
+                let center = parts.centers[triangle as usize][axis];
+                let bin = (((center - low[axis]) / width) as usize).min(BINS - 1);
+                let (from, to) = parts.boxes[triangle as usize];
+                bins[bin] = (bins[bin].0.min(from), bins[bin].1.max(to));
             }
             for plane in 1..BINS {
-                let diagonal = |part: &[(DVec3, DVec3)]| {
+                let diagonal = |part: &[(Vec3, Vec3)]| {
                     let (low, high) = part
                         .iter()
-                        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |a, b| {
+                        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |a, b| {
                             (a.0.min(b.0), a.1.max(b.1))
                         });
-                    (high - low).length_squared()
+                    (high.as_dvec3() - low.as_dvec3()).length_squared()
                 };
                 let cost = diagonal(&bins[..plane]) + diagonal(&bins[plane..]);
                 if cost < best.0 {
@@ -273,8 +312,8 @@ impl Cluster {
             return;
         }
         let (mut left, mut right) = (Vec::new(), Vec::new());
-        for (&triangle, center) in self.triangles.iter().zip(&centers) {
-            let side = if center[axis] < place {
+        for &triangle in &self.triangles {
+            let side = if parts.centers[triangle as usize][axis] < place {
                 &mut left
             } else {
                 &mut right
@@ -284,10 +323,10 @@ impl Cluster {
         if left.is_empty() || right.is_empty() {
             return;
         }
-        let parts = (Cluster::new(mesh, left), Cluster::new(mesh, right));
-        let kept = parts.0.radius.powi(2) + parts.1.radius.powi(2);
+        let split = (Cluster::new(parts, left), Cluster::new(parts, right));
+        let kept = split.0.radius.powi(2) + split.1.radius.powi(2);
         if kept <= (1.0 - LEAST_GAIN) * self.radius.powi(2) {
-            self.split = Some(Box::new(parts));
+            self.split = Some(Box::new(split));
         }
     }
 

@@ -6,7 +6,7 @@ use glam::Vec3;
 use obvhs::bvh2::Bvh2;
 
 use super::binary;
-use super::compressed::{CompressedBvh, Place};
+use super::compressed::{CompressedBvh, Place, Refitted};
 use super::wide::WideBvh;
 use super::{AccelError, MAX_COORDINATE_M, MAX_TRIANGLES};
 use crate::shared::NONE;
@@ -36,7 +36,7 @@ impl Tree {
                 count: triangles.len(),
             });
         }
-        let bounds = bounds_of(triangles)?;
+        let bounds = bounds_of(triangles, 0)?;
         let mut tree = binary::build(triangles);
         let mut wide = WideBvh::empty();
         if let Some(built) = &mut tree {
@@ -57,24 +57,36 @@ impl Tree {
         })
     }
 
-    /// As [`super::WorldBvh::refit`].
+    /// As [`super::WorldBvh::refit_part`].
     ///
     /// # Errors
     /// As [`super::WorldBvh::build`].
-    pub(super) fn refit(&mut self, triangles: &[[Vec3; 3]]) -> Result<bool, AccelError> {
-        if triangles.len() != self.triangles.len() {
-            return Ok(false);
-        }
-        self.bounds = bounds_of(triangles)?;
+    pub(super) fn refit(
+        &mut self,
+        first: usize,
+        triangles: &[[Vec3; 3]],
+    ) -> Result<(), AccelError> {
+        bounds_of(triangles, first)?;
         self.built_surface.get_or_insert(self.wide.surface());
-        self.wide.refit(triangles, self.first_id);
-        self.triangles.copy_from_slice(triangles);
+        let moved = first..first + triangles.len();
+        self.triangles[moved.clone()].copy_from_slice(triangles);
+        self.bounds = bounds_of(&self.triangles, 0)?;
+        self.wide.refit(&self.triangles, self.first_id, &moved);
         // A device that asks for its tree later has it built anew.
         self.binary = Mutex::new(None);
         if let Some(compressed) = self.compressed.get_mut() {
-            compressed.refit(triangles, self.first_id);
+            compressed.refit(&self.triangles, self.first_id, &moved);
         }
-        Ok(true)
+        Ok(())
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// As [`super::WorldBvh::gpu_refitted`].
+    pub(super) fn refitted(&self) -> Option<&Refitted> {
+        self.compressed.get()?.refitted.as_ref()
     }
 
     /// As [`super::WorldBvh::is_worn`].
@@ -104,14 +116,16 @@ impl Tree {
     }
 }
 
-/// Smallest and largest vertex coordinates; `None` without triangles.
-fn bounds_of(triangles: &[[Vec3; 3]]) -> Result<Option<(Vec3, Vec3)>, AccelError> {
+/// Smallest and largest vertex coordinates; `None` without triangles. `first`: the number of the first triangle, for messages.
+fn bounds_of(triangles: &[[Vec3; 3]], first: usize) -> Result<Option<(Vec3, Vec3)>, AccelError> {
     let mut low = Vec3::splat(f32::INFINITY);
     let mut high = Vec3::splat(f32::NEG_INFINITY);
     for (index, triangle) in triangles.iter().enumerate() {
         for vertex in triangle {
             if !vertex.is_finite() || vertex.abs().max_element() > MAX_COORDINATE_M {
-                return Err(AccelError::Coordinate { triangle: index });
+                return Err(AccelError::Coordinate {
+                    triangle: first + index,
+                });
             }
             low = low.min(*vertex);
             high = high.max(*vertex);

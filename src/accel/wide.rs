@@ -1,11 +1,13 @@
 //! The CPU's tree: 8-wide nodes of f32 boxes, leaves of one or two blocks of eight triangles, collapsed from a BVH2 by dynamic programming
 //! (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017, section 3.1).
 
+use std::ops::Range;
+
 use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 
-use super::binary::padded_boxes;
+use super::binary::padded_box;
 use super::large_pages::on_large_pages;
 
 /// High bit of a child word: the child is a leaf, the rest is first block << 3 | blocks - 1. Without it the word is a node index.
@@ -62,6 +64,17 @@ const ZERO_BLOCK: TriangleBlock = TriangleBlock {
 };
 
 impl WideNode {
+    /// Around its children.
+    fn bounds(&self) -> Aabb {
+        let children = (0..WIDTH).filter(|&slot| self.children[slot] != LEAF);
+        children.fold(Aabb::empty(), |whole, slot| whole.union(&self.child(slot)))
+    }
+
+    fn child(&self, slot: usize) -> Aabb {
+        let corner = |side: usize| self.planes.map(|axis| axis[side][slot]);
+        Aabb::new(corner(0).into(), corner(1).into())
+    }
+
     fn set_slot(&mut self, slot: usize, bounds: &Aabb) {
         for axis in 0..3 {
             self.planes[axis][0][slot] = bounds.min[axis];
@@ -108,63 +121,65 @@ impl WideBvh {
     pub(super) fn surface(&self) -> f32 {
         let (mut sum, mut root) = (0.0f64, 0.0f64);
         for (index, node) in self.nodes.iter().enumerate() {
-            let mut whole = Aabb::empty();
             for slot in (0..WIDTH).filter(|&slot| node.children[slot] != LEAF) {
-                let corner = |side: usize| node.planes.map(|axis| axis[side][slot]);
-                let child = Aabb::new(corner(0).into(), corner(1).into());
-                sum += f64::from(child.half_area());
-                whole = whole.union(&child);
+                sum += f64::from(node.child(slot).half_area());
             }
             if index == 0 {
-                root = f64::from(whole.half_area());
+                root = f64::from(node.bounds().half_area());
             }
         }
         if root > 0.0 { (sum / root) as f32 } else { 0.0 }
     }
 
-    /// Moves the triangles; the tree keeps its shape.
-    pub(super) fn refit(&mut self, triangles: &[[Vec3; 3]], first_id: u32) {
-        let boxes = padded_boxes(triangles);
-        let mut bounds = vec![Aabb::empty(); self.nodes.len()];
+    /// Those of the triangles whose numbers are in `moved` have moved; the tree keeps its shape.
+    pub(super) fn refit(&mut self, triangles: &[[Vec3; 3]], first_id: u32, moved: &Range<usize>) {
+        // New boxes, where there are any.
+        let mut bounds: Vec<Option<Aabb>> = vec![None; self.nodes.len()];
         // Children stand after their parents.
         for index in (0..self.nodes.len()).rev() {
-            let mut whole = Aabb::empty();
+            let mut is_touched = false;
             for slot in 0..WIDTH {
                 let child = self.nodes[index].children[slot];
                 let of_child = match child & LEAF {
                     _ if child == LEAF => continue,
                     0 => bounds[child as usize],
-                    _ => self.refit_leaf(child, triangles, &boxes, first_id),
+                    _ => self.refit_leaf(child, triangles, first_id, moved),
                 };
-                self.nodes[index].set_slot(slot, &of_child);
-                whole = whole.union(&of_child);
+                if let Some(of_child) = of_child {
+                    self.nodes[index].set_slot(slot, &of_child);
+                    is_touched = true;
+                }
             }
-            bounds[index] = whole;
+            bounds[index] = is_touched.then(|| self.nodes[index].bounds());
         }
     }
 
-    /// The leaf's box.
+    /// The leaf's box, if it has a triangle that has moved.
     fn refit_leaf(
         &mut self,
         leaf: u32,
         triangles: &[[Vec3; 3]],
-        boxes: &[Aabb],
         first_id: u32,
-    ) -> Aabb {
+        moved: &Range<usize>,
+    ) -> Option<Aabb> {
         let first = ((leaf & !LEAF) >> 3) as usize;
         let end = first + 1 + (leaf & 7) as usize;
+        let number = |id: u32| (id - first_id) as usize;
+        let blocks = || (first..end).map(|block| (block, self.filled[block] as usize));
+        let mut ids = blocks().flat_map(|(block, filled)| &self.blocks[block].ids[..filled]);
+        if !ids.any(|&id| moved.contains(&number(id))) {
+            return None;
+        }
         let mut whole = Aabb::empty();
-        for (block, &filled) in self.blocks[first..end]
-            .iter_mut()
-            .zip(&self.filled[first..end])
-        {
-            for lane in 0..filled as usize {
-                let triangle = (block.ids[lane] - first_id) as usize;
+        for at in first..end {
+            let block = &mut self.blocks[at];
+            for lane in 0..self.filled[at] as usize {
+                let triangle = number(block.ids[lane]);
                 block.set_lane(lane, &triangles[triangle]);
-                whole = whole.union(&boxes[triangle]);
+                whole = whole.union(&padded_box(triangles, triangle));
             }
         }
-        whole
+        Some(whole)
     }
 
     /// `None` if the tree is deeper than [`MAX_LEVELS`].

@@ -165,6 +165,7 @@ fn heads() -> Vec<String> {
         "steps",
         "idle",
         "submissions",
+        "uncut",
         "waits",
     ];
     let all = first.into_iter().chain(places).chain(last);
@@ -190,6 +191,7 @@ fn cells(frame: &GpuFrame) -> Vec<String> {
         traffic.steps.to_string(),
         traffic.idle_steps.to_string(),
         traffic.submissions.to_string(),
+        traffic.recordings.to_string(),
         traffic.waits.to_string(),
     ]);
     cells
@@ -240,6 +242,8 @@ mod tests {
             assert!(traffic.bytes_up > 0 && traffic.bytes_down > 0, "{frame:?}");
             assert!(traffic.dispatches >= traffic.submissions, "{frame:?}");
             assert!(traffic.submissions >= traffic.waits, "{frame:?}");
+            assert!(traffic.submissions >= traffic.recordings, "{frame:?}");
+            assert!(traffic.recordings > 0, "{frame:?}");
         }
         // Negative control: a place left out is missed.
         let mut lacking = frames[0].clone();

@@ -116,8 +116,11 @@ impl Film {
                 self.splats[pixel].add(&splat);
             }
         }
-        for sums in &mut self.splats {
-            sums.photons += photons;
+        // Not looked at in vain: a film is large.
+        if photons > 0 {
+            for sums in &mut self.splats {
+                sums.photons += photons;
+            }
         }
     }
 
@@ -143,9 +146,15 @@ impl Film {
         sums.n == 0 && sums.n_real == 0 && sums.non_finite == 0
     }
 
-    /// Takes all samples back for another plan of samples, in the memory that is there; [`Film::set_groups`] and [`Film::set_photons`] follow.
-    pub fn renew(&mut self) {
-        self.pixels.fill(PixelSums::default());
+    /// Takes all samples back for another plan of samples, as [`Film::set_sample_factors`], in the memory that is there; [`Film::set_groups`] and
+    /// [`Film::set_photons`] follow.
+    pub fn renew(&mut self, factors: impl Iterator<Item = u32>) {
+        for (sums, sample_factor) in self.pixels.iter_mut().zip(factors) {
+            *sums = PixelSums {
+                sample_factor,
+                ..PixelSums::default()
+            };
+        }
         self.guides.fill(GuideSums::default());
     }
 

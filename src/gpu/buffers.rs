@@ -1,12 +1,14 @@
 //! The packed scene in storage buffers: bind group 0 of every kernel, under the names that `shaders/gpu/buffers.wgsl` declares.
 
+use std::ops::Range;
+
 use bytemuck::Zeroable;
 
 use super::kernel::UNIFORM_USAGE;
 use super::{GpuDevice, GpuError};
-use crate::accel::WorldBvh;
+use crate::accel::{Refitted, WorldBvh};
 use crate::packed::{
-    Frame, Light, Material, PackedScene, PixelInfo, Resting, TextureRef, Triangle, Vertex,
+    Frame, Light, Material, Moved, PackedScene, PixelInfo, Resting, TextureRef, Triangle, Vertex,
 };
 
 /// What an edit has changed in a packed scene; each includes those before it.
@@ -20,6 +22,8 @@ pub enum Changed {
     Photo,
     /// Where the moving virtual objects are, and the lights.
     Moving,
+    /// A virtual object that rests was moved: what [`SceneParts::moved`] says, or all of the virtual world where that says nothing.
+    Object,
     /// All of the virtual world.
     Virtual,
     All,
@@ -49,6 +53,8 @@ pub struct SceneParts<'a> {
     pub bvh_nodes: [[&'a [[[u32; 4]; 5]]; 3]; 2],
     /// As [`WorldBvh::gpu_leaves`].
     pub bvh_leaves: [[&'a [[f32; 4]]; 2]; 2],
+    /// The records of an object that was moved, and those that its tree's refit changed.
+    pub moved: Option<(&'a Moved, &'a Refitted)>,
 }
 
 impl Default for SceneParts<'_> {
@@ -71,6 +77,7 @@ impl Default for SceneParts<'_> {
             pixels: &[],
             bvh_nodes: [[&[]; 3]; 2],
             bvh_leaves: [[&[]; 2]; 2],
+            moved: None,
         }
     }
 }
@@ -96,6 +103,7 @@ impl<'a> From<&'a PackedScene> for SceneParts<'a> {
             pixels: &scene.pixels,
             bvh_nodes: worlds.map(WorldBvh::gpu_nodes),
             bvh_leaves: worlds.map(WorldBvh::gpu_leaves),
+            moved: (scene.moved.as_ref()).zip(scene.virtual_bvh.gpu_refitted()),
         }
     }
 }
@@ -134,20 +142,55 @@ impl SceneBuffers {
         Ok(scene)
     }
 
-    /// Sends what has changed, where the buffers have room for it; false, and nothing is sent, where they have not.
-    pub fn update(&self, gpu: &GpuDevice, parts: &SceneParts<'_>, changed: Changed) -> bool {
+    /// Sends what has changed; an array that has become too long for its buffer gets another. True where one did: what is bound to the old ones has
+    /// to be bound again.
+    ///
+    /// # Errors
+    /// As [`SceneBuffers::from_parts`]; nothing is sent then.
+    pub fn update(
+        &mut self,
+        gpu: &GpuDevice,
+        parts: &SceneParts<'_>,
+        changed: Changed,
+    ) -> Result<bool, GpuError> {
         let arrays = arrays(parts);
-        let mut pairs = self.arrays.iter().zip(&arrays);
-        if changed == Changed::All
-            || !pairs.all(|((_, buffer), array)| array.len() <= buffer.size())
-        {
-            return false;
+        let changed = match (changed, parts.moved) {
+            (Changed::Object, None) => Changed::Virtual,
+            (changed, _) => changed,
+        };
+        let is_too_long = |at: &usize| arrays[*at].len() > self.arrays[*at].1.size();
+        let too_long: Vec<usize> = (0..arrays.len()).filter(is_too_long).collect();
+        if !too_long.is_empty() {
+            self.replace(gpu, &arrays, &too_long)?;
         }
-        for ((_, buffer), array) in self.arrays.iter().zip(&arrays) {
-            array.write(gpu, buffer, changed);
+        for (at, ((_, buffer), array)) in self.arrays.iter().zip(&arrays).enumerate() {
+            if !too_long.contains(&at) {
+                array.write(gpu, buffer, changed);
+            }
         }
         self.set_frame(gpu, parts);
-        true
+        Ok(!too_long.is_empty())
+    }
+
+    /// Puts those of the arrays into buffers that they fit into.
+    fn replace(
+        &mut self,
+        gpu: &GpuDevice,
+        arrays: &[Array<'_>],
+        which: &[usize],
+    ) -> Result<(), GpuError> {
+        for &at in which {
+            check_size(gpu, arrays[at].what, arrays[at].len())?;
+        }
+        let made = gpu.catching(|| -> Vec<wgpu::Buffer> {
+            let arrays = which.iter().map(|&at| &arrays[at]);
+            arrays.map(|array| storage(gpu, array)).collect()
+        });
+        let made = made.map_err(|error| out_of_memory(gpu, arrays, &error))?;
+        for (&at, buffer) in which.iter().zip(made) {
+            self.arrays[at].1 = buffer;
+        }
+        Ok(())
     }
 
     /// Replaces the frame (camera, lens and sampling) by that of `parts`, whose arrays are those that are here.
@@ -174,25 +217,34 @@ struct Array<'a> {
     pieces: Vec<Piece<'a>>,
 }
 
-/// Bytes, and the smallest edit that changes them.
-type Piece<'a> = (Changed, &'a [u8]);
+struct Piece<'a> {
+    bytes: &'a [u8],
+    /// The smallest edit that changes all of it.
+    changed_by: Changed,
+    /// Those of its bytes that [`Changed::Object`] changes.
+    moved: Vec<Range<usize>>,
+}
 
 impl Array<'_> {
     /// Bytes.
     fn len(&self) -> u64 {
-        (self.pieces.iter())
-            .map(|(_, bytes)| bytes.len() as u64)
-            .sum()
+        let pieces = self.pieces.iter();
+        pieces.map(|piece| piece.bytes.len() as u64).sum()
     }
 
     /// Sends the pieces that an edit has changed.
     fn write(&self, gpu: &GpuDevice, buffer: &wgpu::Buffer, changed: Changed) {
         let mut offset = 0;
-        for (changed_by, bytes) in &self.pieces {
-            if *changed_by <= changed {
-                gpu.write(buffer, offset, bytes);
+        for piece in &self.pieces {
+            if piece.changed_by <= changed {
+                gpu.write(buffer, offset, piece.bytes);
+            } else if changed == Changed::Object {
+                for range in &piece.moved {
+                    let at = offset + range.start as u64;
+                    gpu.write(buffer, at, &piece.bytes[range.clone()]);
+                }
             }
-            offset += bytes.len() as u64;
+            offset += piece.bytes.len() as u64;
         }
     }
 }
@@ -218,19 +270,27 @@ fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 15] {
         pixels,
         bvh_nodes: [[real_roots, real_nodes, _], [roots, nodes, moving_nodes]],
         bvh_leaves: [[real_leaves, _], [leaves, moving_leaves]],
+        moved,
     } = *parts;
+    let (object, refitted) = moved.unzip();
     let triangles = triangles.split_at(resting.triangles);
     let vertices = vertices.split_at(resting.vertices);
     [
         array(
             "triangles",
             "triangles",
-            vec![piece(Virtual, triangles.0), piece(Moving, triangles.1)],
+            vec![
+                in_part(triangles.0, object.map(|o| &o.triangles)),
+                piece(Moving, triangles.1),
+            ],
         ),
         array(
             "vertices",
             "vertices",
-            vec![piece(Virtual, vertices.0), piece(Moving, vertices.1)],
+            vec![
+                in_part(vertices.0, object.map(|o| &o.vertices)),
+                piece(Moving, vertices.1),
+            ],
         ),
         array("materials", "materials", vec![piece(Virtual, materials)]),
         array("texture_refs", "textures", vec![piece(All, texture_refs)]),
@@ -262,7 +322,7 @@ fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 15] {
                 piece(All, real_roots),
                 piece(All, real_nodes),
                 piece(Moving, roots),
-                piece(Virtual, nodes),
+                in_part(nodes, refitted.into_iter().flat_map(|r| &r.nodes)),
                 piece(Moving, moving_nodes),
             ],
         ),
@@ -271,7 +331,7 @@ fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 15] {
             "BVH triangles",
             vec![
                 piece(All, real_leaves),
-                piece(Virtual, leaves),
+                in_part(leaves, refitted.into_iter().flat_map(|r| &r.leaves)),
                 piece(Moving, moving_leaves),
             ],
         ),
@@ -279,7 +339,23 @@ fn arrays<'a>(parts: &SceneParts<'a>) -> [Array<'a>; 15] {
 }
 
 fn piece<T: bytemuck::NoUninit>(changed_by: Changed, records: &[T]) -> Piece<'_> {
-    (changed_by, bytemuck::cast_slice(records))
+    Piece {
+        bytes: bytemuck::cast_slice(records),
+        changed_by,
+        moved: Vec::new(),
+    }
+}
+
+/// Of the virtual world, with the records that go with a moved object.
+fn in_part<'a, 'b, T: bytemuck::NoUninit>(
+    records: &'a [T],
+    moved: impl IntoIterator<Item = &'b Range<usize>>,
+) -> Piece<'a> {
+    let bytes = |range: &Range<usize>| size_of::<T>() * range.start..size_of::<T>() * range.end;
+    Piece {
+        moved: moved.into_iter().map(bytes).collect(),
+        ..piece(Changed::Virtual, records)
+    }
 }
 
 /// The real world comes first, and nothing moves in it.
@@ -341,100 +417,4 @@ fn mebibytes(bytes: u64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gpu::kernel::reflect_bindings;
-    use crate::gpu::{AdapterChoice, Composer, Features};
-
-    /// A kernel that reads all of `names`.
-    fn bound(names: &[&str]) -> Result<Vec<String>, GpuError> {
-        let reads: String = names.iter().map(|name| format!("_ = &{name};")).collect();
-        let root = format!(
-            "import package::gpu::buffers::{{{}}};
-            @compute @workgroup_size(1) fn main() {{ {reads} }}",
-            names.join(", ")
-        );
-        let wgsl = Composer::default().with_module("root", root).compose(
-            "root",
-            "main",
-            &Features::ALL,
-        )?;
-        let bindings = reflect_bindings(&wgsl).expect("valid");
-        Ok(bindings.into_iter().map(|binding| binding.name).collect())
-    }
-
-    #[test]
-    fn every_buffer_has_the_name_and_place_of_its_declaration() {
-        let parts = SceneParts::default();
-        let arrays = arrays(&parts).map(|array| array.name);
-        let names: Vec<&str> = std::iter::once("frame").chain(arrays).collect();
-        assert_eq!(bound(&names).expect("all are declared"), names);
-        let (_, text) = crate::gpu::compose::MODULES
-            .iter()
-            .find(|(module, _)| *module == "gpu::buffers")
-            .expect("is embedded");
-        assert_eq!(text.matches("@binding").count(), names.len());
-        // Negative control: a name that no shader declares.
-        assert!(bound(&["frame", "vertexes"]).is_err());
-    }
-
-    #[test]
-    fn an_edit_sends_what_it_changes_and_no_more() {
-        if crate::gpu::harness::test_device().is_none() {
-            return;
-        }
-        let gpu = GpuDevice::open(AdapterChoice::Any).expect("opens");
-        let pixels = [PixelInfo::uniform(0); 10];
-        let parts = SceneParts {
-            pixels: &pixels,
-            photo_albedo: &[[0.5; 4]; 3],
-            backdrop: &[0.5; 30],
-            ..SceneParts::default()
-        };
-        let scene = SceneBuffers::from_parts(&gpu, &parts).expect("fits");
-        let frame = size_of::<Frame>() as u64;
-        for (changed, bytes) in [
-            (Changed::Plan, 120),
-            (Changed::View, 120 + 48),
-            (Changed::Photo, 120 + 48 + 120),
-            (Changed::Virtual, 120 + 48 + 120),
-        ] {
-            let before = gpu.traffic();
-            assert!(scene.update(&gpu, &parts, changed));
-            assert_eq!(
-                (gpu.traffic() - before).bytes_up,
-                frame + bytes,
-                "{changed:?}"
-            );
-        }
-        assert!(!scene.update(&gpu, &parts, Changed::All), "made anew");
-        let more = [PixelInfo::uniform(0); 1000];
-        let parts = SceneParts {
-            pixels: &more,
-            ..parts
-        };
-        assert!(!scene.update(&gpu, &parts, Changed::Plan), "no room");
-    }
-
-    #[test]
-    fn a_scene_beyond_the_limits_is_refused_with_what_to_do() {
-        if crate::gpu::harness::test_device().is_none() {
-            return;
-        }
-        let mut gpu = GpuDevice::open(AdapterChoice::Any).expect("opens");
-        let vertices = vec![Vertex::zeroed(); 20_000];
-        let parts = SceneParts {
-            vertices: &vertices,
-            ..SceneParts::default()
-        };
-        assert!(SceneBuffers::from_parts(&gpu, &parts).is_ok());
-        gpu.limits.max_storage_buffer_binding_size = 1 << 20;
-        let error = SceneBuffers::from_parts(&gpu, &parts)
-            .err()
-            .expect("does not fit")
-            .to_string();
-        for part in ["vertices", "1.5 MiB", "1.0 MiB", "--backend cpu"] {
-            assert!(error.contains(part), "{error}");
-        }
-    }
-}
+mod tests;

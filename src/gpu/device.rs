@@ -257,6 +257,11 @@ impl GpuDevice {
         Ok(index)
     }
 
+    /// A recording ends.
+    pub(super) fn count_recording(&self) {
+        count(&self.traffic.recordings, 1);
+    }
+
     /// So many steps of batches were recorded, of which so many were needed.
     pub(super) fn count_steps(&self, recorded: u64, needed: u64) {
         count(&self.traffic.steps, recorded);

@@ -12,10 +12,12 @@ const TELLING_STEPS: f64 = 1000.0;
 const FILLED: f64 = 0.6;
 /// Lanes of the first batch, and of the least.
 const LEAST_LANES: usize = 4096;
-/// Above this more lanes bring no speed, but cost memory.
-const MOST_LANES: usize = 1 << 19;
+/// Above this more lanes bring no speed, but cost memory; up to it, each batch that is saved saves the host its steps.
+const MOST_LANES: usize = 1 << 21;
 /// Batches grow by no more than this at a time.
 const GROWTH: usize = 8;
+/// Batches that could be larger by this factor are planned anew.
+const FAR_MORE: usize = 4;
 /// Seconds that any dispatch takes, however few its lanes, before one was measured.
 const DISPATCH_SECS: f64 = 1e-5;
 
@@ -67,16 +69,33 @@ impl Pacer {
         }
     }
 
-    /// Lanes that the next batch may have: one step of all of them fills a submission.
-    pub fn lanes(&mut self) -> usize {
-        if let Some(secs) = self.secs_per_step {
-            let affordable = ((FILLED * self.longest_secs / secs) as usize).min(self.most_lanes);
+    /// Lanes that the next batch of so many samples may have: one step of all of them fills a submission.
+    pub fn lanes_for(&mut self, samples: u64) -> usize {
+        let of_all = usize::try_from(samples).unwrap_or(usize::MAX);
+        self.lanes().min(of_all.max(LEAST_LANES))
+    }
+
+    /// The same of as many as there are.
+    fn lanes(&mut self) -> usize {
+        if let Some(affordable) = self.affordable_lanes() {
             let least = LEAST_LANES.min(self.most_lanes);
             let most = (self.lanes * GROWTH).min(self.most_lanes);
             self.lanes = affordable.clamp(least, most);
             self.is_trying = self.lanes < affordable;
         }
         self.lanes
+    }
+
+    /// One step of so many fills a submission.
+    fn affordable_lanes(&self) -> Option<usize> {
+        let secs = self.secs_per_step?;
+        Some(((FILLED * self.longest_secs / secs) as usize).min(self.most_lanes))
+    }
+
+    /// Batches of so many lanes were planned while the device seemed slow: so many samples are worth another plan.
+    pub fn affords_far_more(&self, lanes: usize, samples: u64) -> bool {
+        let more = lanes.saturating_mul(FAR_MORE);
+        samples >= more as u64 && self.affordable_lanes().is_some_and(|lanes| lanes >= more)
     }
 
     /// Lanes to make room for where so many are wanted: powers of two, so that buffers are seldom made anew while the pace is found.
@@ -191,6 +210,18 @@ mod tests {
             MOST_LANES,
             "fast devices get large batches"
         );
+        let mut fast = Pacer::new(usize::MAX, false);
+        let load = Load {
+            lane_steps: 1e9,
+            dispatches: 3,
+        };
+        fast.record(Duration::from_millis(1), load);
+        let lanes: Vec<usize> = (0..5).map(|_| fast.lanes_for(100_000)).collect();
+        assert_eq!(lanes, [32_768, 100_000, 100_000, 100_000, 100_000]);
+        assert_eq!(fast.lanes_for(10), LEAST_LANES);
+        assert!(fast.affords_far_more(LEAST_LANES, 100_000));
+        assert!(!fast.affords_far_more(LEAST_LANES, 10_000), "few samples");
+        assert!(!Pacer::new(LEAST_LANES, false).affords_far_more(LEAST_LANES, 100_000));
     }
 
     #[test]

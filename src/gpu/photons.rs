@@ -94,22 +94,37 @@ impl Photons {
         let splats = make("splats", list, Usage::STORAGE | Usage::COPY_SRC);
         let read = Usage::MAP_READ | Usage::COPY_DST;
         let staging = make("splats' staging", list.max(COUNTERS_BYTES), read);
-        let groups = kernel.bind(gpu, |name| match name {
-            "photon_batch" => Some(&batch),
-            "photon_counters" => Some(&counters),
-            "splats" => Some(&splats),
-            name => scene.get(name),
-        })?;
-        Ok(Self {
+        let mut photons = Self {
             kernel,
-            groups,
+            groups: Vec::new(),
             batch,
             counters,
             splats,
             staging,
             next_batch: FIRST_BATCH,
             warm: false,
-        })
+        };
+        photons.bind(gpu, scene)?;
+        Ok(photons)
+    }
+
+    /// Reads these buffers from now on.
+    ///
+    /// # Errors
+    /// As [`Kernel::bind`].
+    pub fn bind(&mut self, gpu: &GpuDevice, scene: &SceneBuffers) -> Result<(), GpuError> {
+        self.groups = self.kernel.bind(gpu, |name| match name {
+            "photon_batch" => Some(&self.batch),
+            "photon_counters" => Some(&self.counters),
+            "splats" => Some(&self.splats),
+            name => scene.get(name),
+        })?;
+        Ok(())
+    }
+
+    /// Holds on to no scene's buffers any more; [`Photons::bind`] comes before the next photons.
+    pub fn unbind(&mut self) {
+        self.groups.clear();
     }
 
     /// Traces the photons of `work` and adds what they bring to the film, as [`crate::cpu::photons::render::render`] does.
@@ -126,47 +141,67 @@ impl Photons {
         watcher: &Watcher<'_>,
     ) -> Result<(), GpuError> {
         let mut first = work.first;
-        while first < work.end && !watcher.is_cancelled() {
-            let of_sequence = (1 << SEQUENCE_BITS) - (first & ((1 << SEQUENCE_BITS) - 1));
-            let count = of_sequence
-                .min(work.end - first)
-                .min(u64::from(self.next_batch));
-            let batch = PhotonBatch {
-                sequence: (first >> SEQUENCE_BITS) as u32,
-                first: (first & ((1 << SEQUENCE_BITS) - 1)) as u32,
-                count: count as u32,
-                most_splats: LARGEST_BATCH,
-                window_begin: work.window[0],
-                window_length: work.window[1],
-                pad: [0; 2],
-            };
-            let begin = Instant::now();
-            let [listed, mixed, mixed_shadow] = self.run(gpu, &batch, places)?;
-            if listed > LARGEST_BATCH {
-                // No room for all: again, fewer at a time.
-                self.next_batch = (self.next_batch / 2).max(WORKGROUP);
-                continue;
-            }
-            let booked = places.begin();
-            let list = self.list(gpu, listed)?;
-            film.add_splats(count, list.into_iter().map(Splat::from));
-            *rays += RayCounts {
-                mixed: mixed.into(),
-                mixed_shadow: mixed_shadow.into(),
-                ..RayCounts::default()
-            };
-            places.end(Place::Photons, booked);
-            first += count;
-            let secs = begin.elapsed().as_secs_f64();
-            let room = u64::from(LARGEST_BATCH) * count / u64::from(2 * listed.max(1));
-            let affordable = match std::mem::replace(&mut self.warm, true) {
-                true => (count as f64 * TARGET_SECS / secs.max(1e-6)) as u64,
-                false => count,
-            };
-            let most = room.min(affordable).min(4 * u64::from(self.next_batch));
-            self.next_batch = most.clamp(u64::from(WORKGROUP), u64::from(LARGEST_BATCH)) as u32;
+        let mut outcome = Ok(());
+        while outcome.is_ok() && first < work.end && !watcher.is_cancelled() {
+            let taken = self.render_batch(gpu, film, work, first, rays, places);
+            first += *taken.as_ref().unwrap_or(&0);
+            outcome = taken.map(|_| ());
         }
-        Ok(())
+        // Once for all batches: every pixel counts them.
+        let booked = places.begin();
+        film.add_splats(first - work.first, std::iter::empty());
+        places.end(Place::Photons, booked);
+        outcome
+    }
+
+    /// The next photons from number `first` on, which pixels do not count yet; how many they are.
+    fn render_batch(
+        &mut self,
+        gpu: &GpuDevice,
+        film: &mut Film,
+        work: &PhotonWork,
+        first: u64,
+        rays: &mut RayCounts,
+        places: &mut Places,
+    ) -> Result<u64, GpuError> {
+        let place = first & ((1 << SEQUENCE_BITS) - 1);
+        let count = ((1 << SEQUENCE_BITS) - place)
+            .min(work.end - first)
+            .min(u64::from(self.next_batch));
+        let batch = PhotonBatch {
+            sequence: (first >> SEQUENCE_BITS) as u32,
+            first: place as u32,
+            count: count as u32,
+            most_splats: LARGEST_BATCH,
+            window_begin: work.window[0],
+            window_length: work.window[1],
+            pad: [0; 2],
+        };
+        let begin = Instant::now();
+        let [listed, mixed, mixed_shadow] = self.run(gpu, &batch, places)?;
+        if listed > LARGEST_BATCH {
+            // No room for all: again, fewer at a time.
+            self.next_batch = (self.next_batch / 2).max(WORKGROUP);
+            return Ok(0);
+        }
+        let booked = places.begin();
+        let list = self.list(gpu, listed)?;
+        film.add_splats(0, list.into_iter().map(Splat::from));
+        *rays += RayCounts {
+            mixed: mixed.into(),
+            mixed_shadow: mixed_shadow.into(),
+            ..RayCounts::default()
+        };
+        places.end(Place::Photons, booked);
+        let secs = begin.elapsed().as_secs_f64();
+        let room = u64::from(LARGEST_BATCH) * count / u64::from(2 * listed.max(1));
+        let affordable = match std::mem::replace(&mut self.warm, true) {
+            true => (count as f64 * TARGET_SECS / secs.max(1e-6)) as u64,
+            false => count,
+        };
+        let most = room.min(affordable).min(4 * u64::from(self.next_batch));
+        self.next_batch = most.clamp(u64::from(WORKGROUP), u64::from(LARGEST_BATCH)) as u32;
+        Ok(count)
     }
 
     /// The counters after a batch.

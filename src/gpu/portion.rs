@@ -16,10 +16,7 @@ pub fn in_order(width: u32, pixels: &[PixelWork]) -> Vec<PixelWork> {
     // Sorted by tile by counting: the list is long, and in the order of the pixels.
     let last = pixels.last().map_or(0, |work| work.pixel);
     let mut next = vec![0u32; most_tiles(width, last) + 1];
-    let tiles: Vec<u32> = pixels
-        .iter()
-        .map(|work| tile_of(width, work.pixel))
-        .collect();
+    let tiles = tiles(width, pixels);
     for &tile in &tiles {
         next[tile as usize + 1] += 1;
     }
@@ -42,6 +39,20 @@ pub fn in_order(width: u32, pixels: &[PixelWork]) -> Vec<PixelWork> {
         }
     }
     sorted
+}
+
+/// [`tile_of`] each pixel; most lie in the row of the one before.
+fn tiles(width: u32, pixels: &[PixelWork]) -> Vec<u32> {
+    let (mut row, mut first) = (0..width, 0);
+    let of_pixel = |work: &PixelWork| {
+        if !row.contains(&work.pixel) {
+            let begin = work.pixel / width * width;
+            (row, first) = (begin..begin + width, tile_of(width, begin));
+        }
+        let x = work.pixel - row.start;
+        first + x / BLOCK_SIDE * (TILE_STRIDE * TILE_STRIDE) + x % TILE_STRIDE
+    };
+    pixels.iter().map(of_pixel).collect()
 }
 
 /// Tiles of the rows down to a pixel, whole blocks of them.
@@ -145,6 +156,8 @@ mod tests {
         pixels.sort_unstable();
         assert!(pixels.iter().eq(list.iter().map(|work| &work.pixel)));
         assert!(in_order(37, &[]).is_empty());
+        let of_each = |pixel: &PixelWork| tile_of(37, pixel.pixel);
+        assert!(tiles(37, &list).into_iter().eq(list.iter().map(of_each)));
     }
 
     #[test]

@@ -129,6 +129,7 @@ impl Recording {
         let begun = stage.places.begin();
         self.encode(stage, &mut encoder);
         finish(&mut encoder);
+        stage.gpu.count_recording();
         self.send(stage, encoder)?;
         let begun = stage.places.end(Place::Record, begun);
         wait()?;

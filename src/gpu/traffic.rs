@@ -10,6 +10,8 @@ pub struct Traffic {
     pub bytes_up: u64,
     pub bytes_down: u64,
     pub submissions: u64,
+    /// Runs of commands that end with sums on their way home: as many submissions as there would be if none were cut by time.
+    pub recordings: u64,
     /// Of the estimator's kernels.
     pub dispatches: u64,
     /// Of batches of samples, as recorded.
@@ -28,6 +30,7 @@ impl std::ops::Sub for Traffic {
             bytes_up: self.bytes_up - before.bytes_up,
             bytes_down: self.bytes_down - before.bytes_down,
             submissions: self.submissions - before.submissions,
+            recordings: self.recordings - before.recordings,
             dispatches: self.dispatches - before.dispatches,
             steps: self.steps - before.steps,
             idle_steps: self.idle_steps - before.idle_steps,
@@ -42,6 +45,7 @@ pub(super) struct TrafficCounter {
     pub bytes_up: AtomicU64,
     pub bytes_down: AtomicU64,
     pub submissions: AtomicU64,
+    pub recordings: AtomicU64,
     pub dispatches: AtomicU64,
     pub steps: AtomicU64,
     pub idle_steps: AtomicU64,
@@ -55,6 +59,7 @@ impl TrafficCounter {
             bytes_up: of(&self.bytes_up),
             bytes_down: of(&self.bytes_down),
             submissions: of(&self.submissions),
+            recordings: of(&self.recordings),
             dispatches: of(&self.dispatches),
             steps: of(&self.steps),
             idle_steps: of(&self.idle_steps),

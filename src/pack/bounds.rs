@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
-use crate::accel::Cover;
+use crate::accel::{Cover, Mesh};
 use crate::packed::{MAX_PHOTON_SPHERES, MAX_SPHERES, NONE, ObjectCover, PackedScene};
 use crate::scene::{Object, Scene, Side};
 
@@ -16,9 +16,9 @@ impl PackedScene {
                 return;
             }
         }
-        let corners = self.corners(first);
+        let mesh = self.mesh(first..self.triangles.len(), |_| true);
         let (whole, smooth) = rayon::join(
-            || Cover::of(&corners, MAX_SPHERES),
+            || Cover::of(&mesh, MAX_SPHERES),
             || self.cover_smooth(first..self.triangles.len()),
         );
         (self.resting_covers, self.resting_smooth_covers) = (vec![whole], vec![smooth]);
@@ -51,7 +51,8 @@ impl PackedScene {
             return false;
         }
         let lamps = self.triangles[first..].partition_point(|t| t.object != NONE);
-        whole.push(Cover::of(&self.corners(first + lamps), 1));
+        let lamps = self.mesh(first + lamps..self.triangles.len(), |_| true);
+        whole.push(Cover::of(&lamps, 1));
         (self.resting_covers, self.resting_smooth_covers) = (whole, smooth);
         true
     }
@@ -73,24 +74,26 @@ impl PackedScene {
         let triangles = resting_triangles(object);
         let known = (covers.iter()).position(|c| (c.object, c.triangles) == (index, triangles));
         let at = known.unwrap_or_else(|| {
-            let corners = |smooth: bool| -> Vec<[Vec3; 3]> {
+            let mesh = |smooth: bool| {
                 let parts = object.instances.iter().filter(|part| {
                     !object.moves(part) && (!smooth || self.is_smooth_part(object, part))
                 });
-                parts
-                    .flat_map(|part| {
-                        let positions = &part.primitive.positions;
-                        let at = |i: u32| {
-                            let position = Vec3::from(positions[i as usize]).as_dvec3();
-                            part.object_from_local.transform_point3(position).as_vec3()
-                        };
-                        part.primitive.triangles.iter().map(move |t| t.map(at))
-                    })
-                    .collect()
+                let mut mesh = Mesh::default();
+                for part in parts {
+                    let first = mesh.points.len() as u32;
+                    mesh.points.extend(part.primitive.positions.iter().map(|p| {
+                        let position = Vec3::from(*p).as_dvec3();
+                        part.object_from_local.transform_point3(position).as_vec3()
+                    }));
+                    let triangles = part.primitive.triangles.iter();
+                    mesh.triangles
+                        .extend(triangles.map(|t| t.map(|i| first + i)));
+                }
+                mesh
             };
             let (whole, smooth) = rayon::join(
-                || Cover::of(&corners(false), MAX_SPHERES),
-                || Cover::of(&corners(true), MAX_PHOTON_SPHERES),
+                || Cover::of(&mesh(false), MAX_SPHERES),
+                || Cover::of(&mesh(true), MAX_PHOTON_SPHERES),
             );
             covers.push(ObjectCover {
                 object: index,

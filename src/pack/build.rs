@@ -1,5 +1,6 @@
 //! Scene to packed scene: transforms composed in f64, the anchor subtracted in f64, then f32.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
@@ -7,14 +8,14 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::camera::frame_camera;
 use super::lights::pack_lights;
 use super::photons::traced_environment;
-use crate::accel::{AccelError, Cover, WorldBvh};
+use crate::accel::{AccelError, Cover, Mesh, WorldBvh};
 use crate::light::environment_table::environment_table;
 use crate::packed::materials::{MaterialKey, MaterialTable};
 use crate::packed::{
     ESTIMATOR_DIRECT, ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_ENV_DRAWN, FRAME_SHUTTER,
-    FRAME_SHUTTER_ORDERED, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, NONE,
-    PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, Resting, SAMPLER_CMJ, SAMPLER_JITTERED,
-    SAMPLER_SOBOL, Triangle, Vertex,
+    FRAME_SHUTTER_ORDERED, Frame, MATERIAL_ALPHA_BLEND, MATERIAL_ALPHA_MASK, MAX_SPHERES, Moved,
+    NONE, PIXEL_BEAM_MAY_MEET_VIRTUAL, PackedScene, PixelInfo, Resting, SAMPLER_CMJ,
+    SAMPLER_JITTERED, SAMPLER_SOBOL, Triangle, Vertex,
 };
 use crate::scene::{
     Camera, EnvironmentMap, Estimator, Exposure, Instance, Lens, LightKind, Material, SamplerKind,
@@ -122,24 +123,10 @@ impl PackedScene {
         self.rebuild_moving(scene)
     }
 
-    /// The same where objects were moved: the tree is refitted, which every ray takes as it takes a new one, but more slowly the farther they have
-    /// come. Where that is far, it is built anew, but in a draft.
-    ///
-    /// # Errors
-    /// As [`PackedScene::build`].
-    pub fn move_virtual(&mut self, scene: &Scene) -> Result<(), PackError> {
-        self.place_virtual(scene)?;
-        let first = self.frame.real_triangle_count;
-        let corners = self.corners(first as usize);
-        let is_draft = self.object_covers.is_some();
-        if !self.virtual_bvh.refit(&corners)? || (!is_draft && self.virtual_bvh.is_worn()) {
-            self.virtual_bvh = WorldBvh::build(&corners, first)?;
-        }
-        self.rebuild_moving(scene)
-    }
-
     /// Puts what rests of the virtual world where it is, and the spheres about it.
-    fn place_virtual(&mut self, scene: &Scene) -> Result<(), PackError> {
+    pub(super) fn place_virtual(&mut self, scene: &Scene) -> Result<(), PackError> {
+        self.moved = None;
+        self.resting_objects.clear();
         let first = self.frame.real_triangle_count as usize;
         self.triangles.truncate(first);
         self.vertices.truncate(self.real_vertex_count);
@@ -180,7 +167,8 @@ impl PackedScene {
         self.triangles.truncate(self.resting.triangles);
         self.vertices.truncate(self.resting.vertices);
         self.add_objects(scene, Side::Virtual, true)?;
-        let cover = Cover::of(&self.corners(self.resting.triangles), MAX_SPHERES);
+        let mesh = self.mesh(self.resting.triangles..self.triangles.len(), |_| true);
+        let cover = Cover::of(&mesh, MAX_SPHERES);
         let covers: Vec<&Cover> = self.resting_covers.iter().chain([&cover]).collect();
         let spheres = Cover::spheres(&covers, MAX_SPHERES);
         self.frame.sphere_count = spheres.len() as u32;
@@ -311,18 +299,38 @@ impl PackedScene {
     /// Appends the parts of one side's objects that move, or those that rest.
     fn add_objects(&mut self, scene: &Scene, side: Side, moving: bool) -> Result<(), PackError> {
         let objects = (scene.objects.iter().enumerate()).filter(|(_, o)| o.side == side);
-        for (index, object) in objects {
-            let parts = object.instances.iter();
-            for instance in parts.filter(|instance| object.moves(instance) == moving) {
-                let material = self.add_material(
-                    &instance.material,
-                    object.self_shadow_bias_m,
-                    object.albedo_from_photo,
-                )?;
-                self.add_instance(&object.world_from_object, instance, material, index as u32);
+        for (index, _) in objects {
+            let (triangles, vertices) = (self.triangles.len(), self.vertices.len());
+            self.add_object(scene, index, moving)?;
+            if side == Side::Virtual && !moving {
+                self.resting_objects.push(Moved {
+                    object: index,
+                    triangles: triangles..self.triangles.len(),
+                    vertices: vertices..self.vertices.len(),
+                });
             }
         }
         self.check_triangles()
+    }
+
+    /// Appends the parts of an object that move, or those that rest.
+    pub(super) fn add_object(
+        &mut self,
+        scene: &Scene,
+        index: usize,
+        moving: bool,
+    ) -> Result<(), PackError> {
+        let object = &scene.objects[index];
+        let parts = object.instances.iter();
+        for instance in parts.filter(|instance| object.moves(instance) == moving) {
+            let material = self.add_material(
+                &instance.material,
+                object.self_shadow_bias_m,
+                object.albedo_from_photo,
+            )?;
+            self.add_instance(&object.world_from_object, instance, material, index as u32);
+        }
+        Ok(())
     }
 
     fn check_triangles(&self) -> Result<(), PackError> {
@@ -444,10 +452,28 @@ impl PackedScene {
     }
 
     pub(super) fn corners(&self, first_triangle: usize) -> Vec<[Vec3; 3]> {
-        self.triangles[first_triangle..]
+        self.corners_of(first_triangle..self.triangles.len())
+    }
+
+    pub(super) fn corners_of(&self, triangles: Range<usize>) -> Vec<[Vec3; 3]> {
+        self.triangles[triangles]
             .iter()
             .map(|t| t.vertices.map(|v| self.position(v)))
             .collect()
+    }
+
+    /// Those of the triangles that are kept.
+    pub(super) fn mesh(&self, range: Range<usize>, is_kept: impl Fn(&Triangle) -> bool) -> Mesh {
+        let kept = self.triangles[range].iter().filter(|t| is_kept(t));
+        let triangles: Vec<[u32; 3]> = kept.map(|t| t.vertices).collect();
+        let vertices = triangles.iter().flatten().copied();
+        let (Some(first), Some(last)) = (vertices.clone().min(), vertices.max()) else {
+            return Mesh::default();
+        };
+        Mesh {
+            points: (first..=last).map(|v| self.position(v)).collect(),
+            triangles: (triangles.iter()).map(|t| t.map(|v| v - first)).collect(),
+        }
     }
 }
 

@@ -6,6 +6,7 @@ mod build;
 pub mod camera;
 mod facets;
 mod lights;
+mod moves;
 mod panes;
 mod photons;
 mod shadows;

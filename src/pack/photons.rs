@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 
-use crate::accel::Cover;
+use crate::accel::{Cover, Mesh};
 use crate::material::{DELTA_ALPHA, GLOSSY_ALPHA, transmits_unblurred};
 use crate::math::luminance;
 use crate::packed::materials::MaterialKey;
@@ -28,15 +28,14 @@ const EVEN_SHARE: f64 = 0.1;
 impl PackedScene {
     /// Covers the smooth surfaces among the virtual triangles in `range`.
     pub(super) fn cover_smooth(&self, range: std::ops::Range<usize>) -> Cover {
+        if range.is_empty() {
+            return Cover::of(&Mesh::default(), MAX_PHOTON_SPHERES);
+        }
         let smooth: Vec<bool> = (self.materials.iter())
             .map(|material| is_smooth_somewhere(self, material))
             .collect();
-        let corners: Vec<[Vec3; 3]> = self.triangles[range]
-            .iter()
-            .filter(|triangle| smooth[triangle.material as usize])
-            .map(|triangle| triangle.vertices.map(|v| self.position(v)))
-            .collect();
-        Cover::of(&corners, MAX_PHOTON_SPHERES)
+        let mesh = self.mesh(range, |triangle| smooth[triangle.material as usize]);
+        Cover::of(&mesh, MAX_PHOTON_SPHERES)
     }
 
     /// Whether a part of an object that is packed has a smooth surface.

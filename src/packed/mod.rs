@@ -12,6 +12,8 @@ pub use environment::RowEdge;
 pub use materials::Material;
 pub use records::*;
 
+use std::ops::Range;
+
 use crate::accel::{Cover, WorldBvh};
 pub use crate::shared::NONE;
 
@@ -59,6 +61,10 @@ pub struct PackedScene {
     pub(crate) material_table: materials::MaterialTable,
     pub(crate) real_vertex_count: usize,
     pub(crate) resting: Resting,
+    /// Where the virtual objects' parts that rest are.
+    pub(crate) resting_objects: Vec<Moved>,
+    /// What the last edit moved, where that was one object and nothing else of the virtual world is new.
+    pub(crate) moved: Option<Moved>,
     /// Over the virtual triangles that rest.
     pub(crate) resting_covers: Vec<Cover>,
     /// Over those of them that are smooth.
@@ -102,6 +108,15 @@ pub struct Resting {
     pub vertices: usize,
 }
 
+/// A virtual object that rests: its records.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Moved {
+    /// Index in the scene.
+    pub object: usize,
+    pub triangles: Range<usize>,
+    pub vertices: Range<usize>,
+}
+
 impl PackedScene {
     /// No geometry, no light, at the origin.
     pub(crate) fn empty() -> Self {
@@ -131,6 +146,8 @@ impl PackedScene {
             material_table: materials::MaterialTable::default(),
             real_vertex_count: 0,
             resting: Resting::default(),
+            resting_objects: Vec::new(),
+            moved: None,
             resting_covers: Vec::new(),
             resting_smooth_covers: Vec::new(),
             object_covers: None,

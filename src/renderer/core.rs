@@ -73,11 +73,21 @@ impl Core {
         Ok(())
     }
 
-    /// Packs the virtual world anew after an object was moved.
+    /// Packs the virtual world anew after an edit that keeps its trees.
     pub fn pack_moved(&mut self, watcher: &Watcher<'_>) -> Result<(), PackError> {
         let meter = Meter::begin(watcher, Phase::Trees, 1);
         let begun = self.places.begin();
         self.packed.move_virtual(&self.scene)?;
+        self.places.end(Place::Trees, begun);
+        meter.end();
+        Ok(())
+    }
+
+    /// Packs one virtual object anew, which rests as it did before.
+    pub fn pack_object(&mut self, object: usize, watcher: &Watcher<'_>) -> Result<(), PackError> {
+        let meter = Meter::begin(watcher, Phase::Trees, 1);
+        let begun = self.places.begin();
+        self.packed.move_object(&self.scene, object)?;
         self.places.end(Place::Trees, begun);
         meter.end();
         Ok(())
@@ -244,15 +254,20 @@ impl<'a> Way<'a> {
     /// From where the film stands to `end`, in rays per pixel.
     pub fn to(end: u32, core: &mut Core, watcher: &Watcher<'a>) -> Self {
         let begun = core.places.begin();
-        let (mut taken, mut wanted) = (0, 0);
+        let (mut taken, mut factors) = (0, 0);
         let samples_total = end - core.film.first_sample;
+        let mut samples = None;
         for (sums, info) in core.film.pixels.iter().zip(&core.packed.pixels) {
             if is_within_reach(info) {
+                let factor = sums.sample_factor.max(1);
                 taken += u64::from(sums.n);
-                wanted += u64::from(samples_total) * u64::from(sums.sample_factor.max(1));
+                factors += u64::from(factor);
+                let of_pixel = sums.n / factor;
+                samples = Some(samples.unwrap_or(of_pixel).min(of_pixel));
             }
         }
-        let samples = core.samples().unwrap_or(samples_total);
+        let wanted = u64::from(samples_total) * factors;
+        let samples = samples.unwrap_or(samples_total);
         core.places.end(Place::List, begun);
         Self {
             watcher: *watcher,

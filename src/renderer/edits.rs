@@ -111,7 +111,8 @@ impl Renderer {
         self.restart(true, Changed::All, watcher)
     }
 
-    /// Moves an object of the scene, which then rests there. A virtual one costs the virtual BVH, a real one everything.
+    /// Moves an object of the scene, which then rests there. A virtual one that rested costs its own records and a refit of its tree, one that moved the virtual
+    /// BVH, a real one everything.
     ///
     /// # Errors
     /// There is no such object, or as [`Renderer::new`].
@@ -125,6 +126,7 @@ impl Renderer {
         let entry = objects
             .get_mut(object)
             .ok_or(RenderError::NoSuchObject(object))?;
+        let rested = !entry.is_animated();
         entry.world_from_object = world_from_object;
         entry.motion = None;
         for instance in &mut entry.instances {
@@ -132,6 +134,10 @@ impl Renderer {
             instance.deformation = None;
         }
         match entry.side {
+            Side::Virtual if rested => {
+                self.core.pack_object(object, watcher)?;
+                self.restart(false, Changed::Object, watcher)
+            }
             Side::Virtual => {
                 self.core.pack_moved(watcher)?;
                 self.restart(false, Changed::Virtual, watcher)

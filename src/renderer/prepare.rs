@@ -234,15 +234,17 @@ impl Renderer {
         };
         let begun = core.places.end(Place::Backdrop, begun);
         let (width, height) = (core.packed.frame.width, core.packed.frame.height);
-        if (core.film.width, core.film.height) != (width, height) {
+        let factors = core.packed.pixels.iter().map(|p| p.sample_factor);
+        let fits = (core.film.width, core.film.height) == (width, height);
+        if !fits {
             let first = core.film.first_sample;
             core.film = Film::new(width, height, first, core.options.guides);
-        } else if core.rays.traced() > 0 {
-            // Of a film that no ray was traced for, memory is not committed.
-            core.film.renew();
         }
-        let factors = core.packed.pixels.iter().map(|p| p.sample_factor);
-        core.film.set_sample_factors(factors);
+        // Of a film that no ray was traced for, memory is not committed.
+        match fits && core.rays.traced() > 0 {
+            true => core.film.renew(factors),
+            false => core.film.set_sample_factors(factors),
+        }
         let grouped = core.options.keeps_groups(core.scene.settings.combine);
         core.film.set_groups(grouped);
         core.film.set_photons(core.packed.photons_per_ray > 0);

@@ -11,7 +11,8 @@ const MAX_PASS_SAMPLES: u32 = 8;
 /// ... or as many more as take no longer than this, by the last pass.
 const PASS_SECS: f64 = 0.5;
 
-/// Takes the samples before `end` of those before `end_of_all`, both in rays per pixel, and what edge pixels then lack.
+/// Takes the samples before `end` of those before `end_of_all`, both in rays per pixel, and what edge pixels then lack. Where nobody watches, in one
+/// pass: more of them only let the film be shown, or left as it is, in between.
 pub(super) fn advance(
     core: &mut Core,
     end: u32,
@@ -21,7 +22,10 @@ pub(super) fn advance(
     let first = core.film.first_sample;
     let mut way = Way::to(end_of_all, core, watcher);
     while first + way.samples < end {
-        let count = pass_samples(way.samples, core.secs_per_ray, watcher.secs_left());
+        let count = match watcher.is_nobody() {
+            true => u32::MAX,
+            false => pass_samples(way.samples, core.secs_per_ray, watcher.secs_left()),
+        };
         let next = end.min((first + way.samples).saturating_add(count));
         let begin = Instant::now();
         core.take_photons(next, watcher)?;

@@ -172,6 +172,39 @@ fn bits(renderer: &Renderer) -> Vec<u32> {
     values.map(|value| value.to_bits()).collect()
 }
 
+/// On a device too, to which no more than its own records are sent. Control: before it was moved.
+#[test]
+fn a_moved_object_is_rendered_as_if_it_had_stood_there() {
+    let nobody = Watcher::none();
+    let mut backends = vec![BackendChoice::Cpu];
+    backends.extend(crate::gpu::harness::test_device().map(|_| BackendChoice::Gpu));
+    for backend in backends {
+        let mut scene = scene_with_a_photo(false);
+        scene.settings.backend = backend;
+        let mut beside = scene.objects[1].clone();
+        beside.world_from_object = glam::DMat4::from_translation(glam::DVec3::new(-0.4, 0.2, 0.1));
+        scene.objects.push(beside);
+        let new = |scene: &crate::scene::Scene| {
+            Renderer::new(scene.clone(), RendererOptions::default(), &nobody).expect("fits")
+        };
+        let rendered = |renderer: &mut Renderer| {
+            (renderer.advance(Budget::Complete, &nobody)).expect("renders");
+            bits(renderer)
+        };
+        let mut edited = new(&scene);
+        let mut before = rendered(&mut edited);
+        for right_m in [0.05, 0.08] {
+            let to = glam::DMat4::from_translation(glam::DVec3::new(right_m, -0.05, 0.02));
+            (edited.set_object_transform(1, to, &nobody)).expect("fits");
+            scene.objects[1].world_from_object = to;
+            let after = rendered(&mut edited);
+            assert_eq!(after, rendered(&mut new(&scene)), "{backend:?}");
+            assert_ne!(after, before, "control");
+            before = after;
+        }
+    }
+}
+
 #[test]
 fn a_material_is_replaced_as_if_it_had_always_been_there() {
     let nobody = Watcher::none();

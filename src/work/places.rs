@@ -19,6 +19,8 @@ pub enum Place {
     Film,
     /// The scene's records to the device.
     Upload,
+    /// Kernels composed and compiled.
+    Kernels,
     /// Which samples are taken.
     List,
     /// Commands to the device: recorded and submitted.
@@ -34,13 +36,14 @@ pub enum Place {
 }
 
 impl Place {
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Photo,
         Self::Trees,
         Self::Backdrop,
         Self::Pilot,
         Self::Film,
         Self::Upload,
+        Self::Kernels,
         Self::List,
         Self::Record,
         Self::Wait,
@@ -57,6 +60,7 @@ impl Place {
             Self::Pilot => "pilot",
             Self::Film => "film",
             Self::Upload => "upload",
+            Self::Kernels => "kernels",
             Self::List => "list",
             Self::Record => "record",
             Self::Wait => "wait",

@@ -123,6 +123,11 @@ impl<'a> Watcher<'a> {
         }
     }
 
+    /// Nobody hears, and nobody ends what runs.
+    pub fn is_nobody(&self) -> bool {
+        self.cancelled.is_none() && self.deadline.is_none() && self.heard.is_none()
+    }
+
     /// The caller wants the end, or the time is over. What runs then stops soon, and leaves whole pixels.
     pub fn is_cancelled(&self) -> bool {
         self.cancelled.is_some_and(|cancelled| cancelled())

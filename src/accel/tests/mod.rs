@@ -1,4 +1,5 @@
 mod gpu;
+mod refit;
 
 use glam::Vec3;
 
@@ -353,8 +354,16 @@ fn moved(triangles: &[[Vec3; 3]], by: Vec3) -> Vec<[Vec3; 3]> {
     triangles.iter().map(|t| t.map(|v| v + by)).collect()
 }
 
+fn mesh(triangles: &[[Vec3; 3]]) -> Mesh {
+    let corners = 3 * triangles.len() as u32;
+    Mesh {
+        points: triangles.concat(),
+        triangles: (0..corners).step_by(3).map(|i| [i, i + 1, i + 2]).collect(),
+    }
+}
+
 fn cover(triangles: &[[Vec3; 3]], max: usize) -> Vec<[f32; 4]> {
-    Cover::spheres(&[&Cover::of(triangles, max)], max)
+    Cover::spheres(&[&Cover::of(&mesh(triangles), max)], max)
 }
 
 #[test]
@@ -389,7 +398,7 @@ fn spheres_cover_tightly_and_are_few() {
 fn spheres_over_two_meshes_cover_both_and_are_shared_out_by_what_they_save() {
     let rests = slivers(2000, 4, 1e-3);
     let ball = moved(&sphere(30, 60, 1.0), Vec3::X * 50.0);
-    let covers = [Cover::of(&rests, 16), Cover::of(&ball, 16)];
+    let covers = [&rests, &ball].map(|triangles| Cover::of(&mesh(triangles), 16));
     let spheres = Cover::spheres(&[&covers[0], &covers[1]], 16);
     assert!(covered(&rests, &spheres) && covered(&ball, &spheres));
     assert!(spheres.len() <= 16);

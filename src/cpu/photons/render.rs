@@ -32,12 +32,10 @@ pub fn render(
         for (_, traced) in &tasks {
             rays += *traced;
         }
-        film.add_splats(
-            end - first,
-            tasks.into_iter().flat_map(|(splats, _)| splats),
-        );
+        film.add_splats(0, tasks.into_iter().flat_map(|(splats, _)| splats));
         first = end;
     }
+    film.add_splats(first - work.first, std::iter::empty());
     rays
 }
 

@@ -29,6 +29,13 @@ impl Blocks {
         (pixel / self.width / SIDE_PX) * self.columns + pixel % self.width / SIDE_PX
     }
 
+    /// Blocks of all pixels, row by row.
+    pub fn of_pixels(&self) -> impl Iterator<Item = usize> + use<> {
+        let (width, height, columns) = (self.width, self.height, self.columns);
+        let of_row = move |y: usize| (0..width).map(move |x| y / SIDE_PX * columns + x / SIDE_PX);
+        (0..height).flat_map(of_row)
+    }
+
     /// Pixels of a block, those outside the picture left out.
     pub fn pixels(&self, block: usize) -> impl Iterator<Item = usize> + use<> {
         let (x0, y0) = self.corner(block);

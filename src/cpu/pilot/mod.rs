@@ -96,8 +96,14 @@ pub fn pilot(scene: &mut PackedScene, grid: Option<&LensGrid>, meter: &Meter<'_>
         }
         rates
     };
-    scene.pixels = (0..flags.len())
-        .map(|pixel| rates[blocks.of_pixel(pixel)].pixel(flags[pixel]))
+    let plans: Vec<[PixelInfo; 2]> = (rates.iter())
+        .map(|rates| [0, PIXEL_BEAM_MAY_MEET_VIRTUAL].map(|near| rates.pixel(near)))
+        .collect();
+    scene.pixels = (blocks.of_pixels().zip(flags))
+        .map(|(block, flags)| PixelInfo {
+            flags,
+            ..plans[block][usize::from(flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0)]
+        })
         .collect();
     if sharing_allowed(scene) {
         share(&mut scene.pixels, &blocks, &rates);

@@ -63,7 +63,7 @@ fn a_renewed_film_is_a_new_one() {
     assert_ne!(film, new, "control");
     film.set_groups(true);
     film.set_sample_factors([2, 3, 4].into_iter());
-    film.renew();
+    film.renew([0; 3].into_iter());
     film.set_groups(false);
     assert_eq!(film, new);
 }

@@ -60,6 +60,7 @@ pub struct GpuBackend {
 struct Parked {
     features: Features,
     kernels: Vec<Kernel>,
+    photons: Option<Photons>,
 }
 
 fn compile(
@@ -113,29 +114,48 @@ impl GpuBackend {
     /// As [`GpuBackend::new`].
     pub fn update_scene(&mut self, scene: &PackedScene, changed: Changed) -> Result<(), GpuError> {
         let parts = SceneParts::from(scene);
-        if !self.scene.update(&self.gpu, &parts, changed) {
-            self.scene = SceneBuffers::from_parts(&self.gpu, &parts)?;
+        if self.scene.update(&self.gpu, &parts, changed)? {
             // Bind groups name the old buffers.
             self.groups.clear();
-            self.photons = None;
+            if let Some(photons) = &mut self.photons {
+                photons.bind(&self.gpu, &self.scene)?;
+            }
         }
         let features = Features::wanted(scene, self.specialised);
         if features != self.features {
             self.change_features(features)?;
         }
-        Ok(())
+        match scene.photons_per_ray {
+            0 => Ok(()),
+            _ => self.prepare_photons(),
+        }
     }
 
     /// Takes other kernels, compiled now or kept from before: a video goes back and forth between moving and resting.
     fn change_features(&mut self, features: Features) -> Result<(), GpuError> {
         let kept = (self.parked.iter()).position(|parked| parked.features == features);
-        let kernels = match kept {
-            Some(kept) => self.parked.swap_remove(kept).kernels,
-            None => compile(&self.gpu, &Composer::default(), &features)?,
+        let (kernels, mut photons) = match kept {
+            Some(kept) => {
+                let parked = self.parked.swap_remove(kept);
+                (parked.kernels, parked.photons)
+            }
+            None => {
+                let begun = self.places.begin();
+                let kernels = compile(&self.gpu, &Composer::default(), &features)?;
+                self.places.end(Place::Kernels, begun);
+                (kernels, None)
+            }
         };
+        if let Some(photons) = &mut photons {
+            photons.bind(&self.gpu, &self.scene)?;
+        }
+        if let Some(photons) = &mut self.photons {
+            photons.unbind();
+        }
         let before = Parked {
             features: std::mem::replace(&mut self.features, features),
             kernels: std::mem::replace(&mut self.kernels, kernels),
+            photons: std::mem::replace(&mut self.photons, photons),
         };
         self.parked.push(before);
         let state_parts = state_parts(&self.kernels);
@@ -146,7 +166,6 @@ impl GpuBackend {
         }
         self.groups.clear();
         self.courses = Default::default();
-        self.photons = None;
         self.warm = false;
         Ok(())
     }
@@ -278,16 +297,21 @@ impl GpuBackend {
         rays: &mut RayCounts,
         watcher: &Watcher<'_>,
     ) -> Result<(), GpuError> {
-        let photons = match &mut self.photons {
-            Some(photons) => photons,
-            none => none.insert(Photons::new(
-                &self.gpu,
-                &Composer::default(),
-                &self.features,
-                &self.scene,
-            )?),
-        };
+        self.prepare_photons()?;
+        let photons = self.photons.as_mut().expect("they are prepared");
         photons.render(&self.gpu, film, work, rays, &mut self.places, watcher)
+    }
+
+    /// Compiles the photons' kernel, unless it is there.
+    fn prepare_photons(&mut self) -> Result<(), GpuError> {
+        if self.photons.is_none() {
+            let begun = self.places.begin();
+            let composer = Composer::default();
+            let made = Photons::new(&self.gpu, &composer, &self.features, &self.scene)?;
+            self.photons = Some(made);
+            self.places.end(Place::Kernels, begun);
+        }
+        Ok(())
     }
 
     /// Makes room for so many pixels.

@@ -101,6 +101,8 @@ impl Round {
 /// A batch of a recording: its samples, and how far the portion is once it is summed.
 struct Planned {
     batch: Batch,
+    /// That it might have.
+    most_lanes: usize,
     samples: u64,
     after: Cursor,
 }
@@ -139,9 +141,10 @@ impl GpuBackend {
         slots: &Slots,
         mut before: wgpu::CommandEncoder,
     ) -> Result<(), GpuError> {
+        let samples = work.iter().map(|work| u64::from(work.samples())).sum();
         let mut cursor = Cursor::default();
         loop {
-            let lanes = self.pacer.lanes();
+            let lanes = self.pacer.lanes_for(samples);
             let lane_count = self.prepare_lanes(lanes)?;
             let Some(lanes) = self.lanes.take() else {
                 return Err(GpuError::Lost("no room for samples".to_owned()));
@@ -187,6 +190,7 @@ impl GpuBackend {
                     with_groups: u32::from(beside.groups && !is_real),
                     ..batch
                 },
+                most_lanes: lanes,
                 samples,
                 after: cursor,
             });
@@ -224,9 +228,11 @@ impl GpuBackend {
         let mut recorded_steps = 0;
         let mut to_run = planned.len();
         let mut after = from;
+        let mut samples_left: u64 = planned.iter().map(|planned| planned.samples).sum();
         for (at, next) in planned.iter().enumerate() {
             let may_end = at > 0 && after.is_between_pixels() && job.watcher.is_cancelled();
-            if may_end || (at > 0 && start.elapsed() > BETWEEN_SUMS) {
+            let are_small = (stage.pacer).affords_far_more(next.most_lanes, samples_left);
+            if may_end || (at > 0 && (are_small || start.elapsed() > BETWEEN_SUMS)) {
                 to_run = at;
                 break;
             }
@@ -240,6 +246,7 @@ impl GpuBackend {
             let ended = round.record(&mut recording, &mut stage, &mut self.parity, lane_steps)?;
             job.watcher.taken(ended);
             recording.end_samples(next.samples);
+            samples_left -= next.samples;
             recorded_steps += steps;
             after = next.after;
         }
