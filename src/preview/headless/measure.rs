@@ -38,6 +38,7 @@ impl Window {
                 self.wait_for_coarse()?;
             }
         }
+        let whole = [4, 16].map(|rays| (rays, self.measure_whole(rays)));
         let added = self.measure_files(&["glb", "gltf"], true)?;
         let swapped = self.measure_files(&["png", "jpg", "jpeg", "webp"], false)?;
         let longest_ms = 1e3 * self.app().longest_frame.as_secs_f64();
@@ -64,6 +65,13 @@ impl Window {
             let processors = Spread::of(of_change().map(|latency| latency.processor_time));
             row(change, times, processors);
         }
+        for (rays, times) in whole {
+            row(
+                &format!("lens, whole picture of {rays} rays"),
+                Spread::of(times?.into_iter()),
+                None,
+            );
+        }
         row("object added", Spread::of(added.into_iter()), None);
         row("photograph swapped", Spread::of(swapped.into_iter()), None);
         let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
@@ -72,6 +80,22 @@ impl Window {
             + &format!(
                 "\nlongest frame of the window: {longest_ms:.0} ms; load of the machine: {load}\n"
             ))
+    }
+
+    /// From edits of the lens to whole pictures of so many rays per pixel, the pause before the first of them included.
+    fn measure_whole(&mut self, rays: u32) -> Result<Vec<Duration>, String> {
+        const PICTURES: u32 = 5;
+        let mut times = Vec::new();
+        for n in 0..PICTURES {
+            let begin = Instant::now();
+            let focus_m = rounded(0.6 + 0.01 * f64::from(n + 1), 1e-4);
+            (self.session_mut()).edit("measure", |composition| {
+                composition.lens.focus_distance_m = focus_m;
+            });
+            self.wait_for_picture(Some(rays))?;
+            times.push(begin.elapsed());
+        }
+        Ok(times)
     }
 
     /// From files that are dropped, one of the scene's own with such an ending, to the pictures that show them first; `undone`: each is taken out
