@@ -35,13 +35,19 @@ fn exr_frames_are_the_png_frames_with_layers() {
         let pattern = format!("shot/out.{number:04}.exr");
         let picture = folder.open(&format!("png/f_{number:04}.png"));
         let expected: Vec<[u8; 3]> = picture.pixels().map(|pixel| pixel.0).collect();
-        // Half floats may fall on the other side of a code's edge.
+        let photo = folder.open(&format!("in/f_{number:04}.png"));
+        let own: Vec<[u8; 3]> = photo.pixels().map(|pixel| pixel.0).collect();
         let found = codes(&folder, &pattern);
         let pairs = found.as_flattened().iter().zip(expected.as_flattened());
-        let off: Vec<u8> = pairs.map(|(a, b)| a.abs_diff(*b)).collect();
-        let equal = off.iter().filter(|d| **d == 0).count();
-        assert!(off.iter().all(|d| *d <= 1), "frame {number}");
-        assert!(100 * equal >= 99 * off.len(), "frame {number}: {equal}");
+        assert!(
+            pairs.clone().all(|(a, b)| a.abs_diff(*b) <= 1),
+            "frame {number}"
+        );
+        // Half floats may fall on the other side of a code's edge, and what hardly changes keeps the photograph's code.
+        let known = pairs.zip(own.as_flattened());
+        let equal = known.filter(|((a, b), own)| a == b || b == own).count();
+        let count = own.as_flattened().len();
+        assert!(100 * equal >= 99 * count, "frame {number}: {equal}");
         let named = format!("exr/f_{number:04}.exr");
         assert!(folder.bytes(&pattern) == folder.bytes(&named));
         let file = ChannelFile::read(&folder.path(&pattern)).expect("reads");
