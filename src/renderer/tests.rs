@@ -146,7 +146,7 @@ fn an_edited_draft_is_a_draft_of_the_edited_scene() {
 
 /// Of a draft, one exposure after another renders what the last one does alone, bit for bit. Control: another exposure.
 #[test]
-fn a_draft_is_exposed_anew_without_a_ray() {
+fn a_draft_that_is_exposed_again_and_again_is_exposed_once() {
     let draft = RendererOptions {
         draft: true,
         ..RendererOptions::default()

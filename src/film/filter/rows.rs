@@ -338,10 +338,8 @@ mod tests {
         assert!(exp_of_negative(-1e6) < 2e-38, "control");
     }
 
-    /// Sums over rows are those over pixels one by one. Control: without a surface.
-    #[test]
-    fn variance_and_taps_are_those_of_each_pixel_alone() {
-        let (width, height) = (13, 6);
+    /// A bent surface with holes, and light on it.
+    fn scene(width: usize, height: usize) -> (Vec<Option<RealSurface>>, Vec<Light>) {
         let surface = |pixel: usize| RealSurface {
             position: Vec3::new(
                 (pixel % width) as f32,
@@ -361,6 +359,59 @@ mod tests {
                 ..Light::default()
             })
             .collect();
+        (surfaces, lights)
+    }
+
+    /// A level over rows is that over pixels one by one. Control: the light before.
+    #[test]
+    fn taps_are_those_of_each_pixel_alone() {
+        let (width, height) = (21, 7);
+        let (surfaces, lights) = scene(width, height);
+        let canvas = Canvas::new(width, &surfaces);
+        let before = canvas.values(&lights);
+        let of = |pixel: usize| before.0.row(pixel / width, 0).map(|row| row[pixel % width]);
+        for step in [1, 2, 16] {
+            let after = canvas.level(step as usize, &before);
+            let mut changed = 0;
+            for (pixel, surface) in surfaces.iter().enumerate() {
+                let Some(a) = surface else {
+                    continue;
+                };
+                let (x, y) = (pixel % width, pixel / width);
+                let [here, _, _, brightness, variance] = of(pixel);
+                let (mut weights, mut sum) = (0.25, 0.25 * here);
+                for (dx, dy) in (0..9).map(|i| (i % 3 - 1, i / 3 - 1)) {
+                    let x = x.wrapping_add_signed(dx * step);
+                    let y = y.wrapping_add_signed(dy * step);
+                    let other = (x < width && y < height).then(|| y * width + x);
+                    let known = other.and_then(|at| Some((at, surfaces[at]?)));
+                    let Some((at, b)) = known.filter(|_| (dx, dy) != (0, 0)) else {
+                        continue;
+                    };
+                    let [there, _, _, other_brightness, _] = of(at);
+                    let off =
+                        (other_brightness - brightness).abs() / (3.0 * variance.sqrt() + 1e-6);
+                    let kernel = 0.5_f32.powi(2 + (dx.abs() + dy.abs()) as i32);
+                    let weight = kernel * super::super::same_surface(a, &b) * (-off).exp();
+                    weights += weight;
+                    sum += weight * there;
+                }
+                let found = after.light(pixel).x;
+                assert!(
+                    (found - sum / weights).abs() < 1e-3,
+                    "{step}: {x} {y}: {found}"
+                );
+                changed += usize::from((found - here).abs() > 0.1);
+            }
+            assert!(changed > 10, "control: {step}: {changed}");
+        }
+    }
+
+    /// Sums over rows are those over pixels one by one. Control: there is a spread wherever there is a surface.
+    #[test]
+    fn variance_is_that_of_each_pixel_alone() {
+        let (width, height) = (13, 6);
+        let (surfaces, lights) = scene(width, height);
         let canvas = Canvas::new(width, &surfaces);
         let variance = canvas.variance(&lights);
         for (pixel, surface) in surfaces.iter().enumerate() {
