@@ -54,6 +54,17 @@ pub(crate) fn small_stacks() -> Option<u64> {
     (kilobytes < LEAST_KILOBYTES).then_some(kilobytes)
 }
 
+/// Under a limit of address space all threads take their memory from one heap: each heap more sets aside 64 MiB of addresses, and twice as
+/// many for a moment, when a thread asks for its first memory, which may be between a look at what is left and taking it. To be called while
+/// there is one thread.
+pub fn share_heap_under_limits() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    if system::limits_addresses() {
+        // SAFETY: it takes two numbers. A C library that refuses them goes on as before.
+        unsafe { libc::mallopt(libc::M_ARENA_MAX, 1) };
+    }
+}
+
 /// What is left under one limit.
 struct Free {
     bytes: u64,
@@ -151,6 +162,14 @@ mod system {
         .into_iter()
         .flatten()
         .collect()
+    }
+
+    #[cfg(target_env = "gnu")]
+    pub fn limits_addresses() -> bool {
+        let limits = read_to_string("/proc/self/limits").unwrap_or_default();
+        ["Max address space", "Max data size"]
+            .into_iter()
+            .any(|name| limit_of(&limits, name).is_some())
     }
 
     pub fn stack_limit() -> Option<u64> {
