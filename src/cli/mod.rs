@@ -122,7 +122,7 @@ impl<E: std::error::Error> From<E> for Failure {
 /// Parses the process's arguments and runs the command.
 pub fn run() -> ExitCode {
     quiet_device_selection();
-    crate::memory::share_heap_under_limits();
+    crate::memory::keep_heap_small_under_limits();
     // Windows are opened by the main thread alone.
     match opens_window(std::env::args_os()) {
         true => run_command(),

@@ -54,16 +54,23 @@ pub(crate) fn small_stacks() -> Option<u64> {
     (kilobytes < LEAST_KILOBYTES).then_some(kilobytes)
 }
 
-/// Under a limit of address space all threads take their memory from one heap: each heap more sets aside 64 MiB of addresses, and twice as
-/// many for a moment, when a thread asks for its first memory, which may be between a look at what is left and taking it. To be called while
-/// there is one thread.
-pub fn share_heap_under_limits() {
+/// Under a limit of addresses or data all threads take their memory from one heap, and large pieces from the system alone, which gets them
+/// back: each heap more sets aside 64 MiB of addresses, and twice as many for a moment, when a thread asks for its first memory, which may be
+/// between a look at what is left and taking it; and a heap keeps what was freed in it. To be called while there is one thread.
+pub fn keep_heap_small_under_limits() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     if system::limits_addresses() {
-        // SAFETY: it takes two numbers. A C library that refuses them goes on as before.
-        unsafe { libc::mallopt(libc::M_ARENA_MAX, 1) };
+        // SAFETY: they take two numbers. A C library that refuses them goes on as before.
+        unsafe {
+            libc::mallopt(libc::M_ARENA_MAX, 1);
+            libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE_PIECE_BYTES);
+        }
     }
 }
+
+/// The C library's own threshold at the start, which it otherwise raises to 32 MiB as it goes.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const LARGE_PIECE_BYTES: i32 = 128 << 10;
 
 /// What is left under one limit.
 struct Free {

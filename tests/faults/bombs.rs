@@ -147,4 +147,9 @@ fn memory_for_what_is_decoded_is_refused_with_the_figures() {
         }
         assert_done(&shell(folder.path(), command));
     }
+    // What threads set aside for heaps of their own, up to 128 MiB each, is nothing that a picture needs.
+    assert_done(&shell(
+        folder.path(),
+        &format!("ulimit -v 250000; {render}"),
+    ));
 }
