@@ -83,14 +83,21 @@ impl Layer {
 
 /// The film of a picture of this size, no smaller than the film's. Guides and groups are left out.
 pub fn enlarged(film: &Film, width: u32, height: u32, mode: Composite) -> Film {
+    let mut whole = Film::new(width, height, 0, false);
+    enlarge(film, mode, &mut whole);
+    whole
+}
+
+/// The same in place of what `whole` held, which has the size.
+pub fn enlarge(film: &Film, mode: Composite, whole: &mut Film) {
+    let (width, height) = (whole.width, whole.height);
     let small_width = film.width as usize;
     let pixels = (0..film.pixels.len()).into_par_iter();
     let layers: Vec<Layer> = pixels
         .map(|pixel| Layer::of(&film.sums(pixel), mode))
         .collect();
     let columns: Vec<_> = (0..width).map(|x| taps(x, width, film.width)).collect();
-    let mut out = Film::new(width, height, 0, false);
-    let rows = out.pixels.par_chunks_mut(width as usize).enumerate();
+    let rows = whole.pixels.par_chunks_mut(width as usize).enumerate();
     rows.for_each(|(y, row)| {
         let (taps_y, weights_y) = taps(y as u32, height, film.height);
         let rows = taps_y.map(|y| &layers[y * small_width..][..small_width]);
@@ -101,10 +108,11 @@ pub fn enlarged(film: &Film, width: u32, height: u32, mode: Composite) -> Film {
             let parts = taps_x.map(|x| &mixed[x]);
             if parts.iter().any(|part| part.is_touched) {
                 *sums = Layer::mixed(parts, weights_x).sums();
+            } else if sums.n > 0 {
+                *sums = PixelSums::default();
             }
         }
     });
-    out
 }
 
 /// Along one axis, the three coarse pixels about the middle of a pixel of `whole`, and their weights; the edge's stand for those beyond.

@@ -25,7 +25,7 @@ pub use composite::{
     Picture, Planes, QUOTIENT_EPSILON, background_pixel, composite, composite_smoothed,
     estimated_error, planes, variance,
 };
-pub use enlarge::{enlarged, nearest};
+pub use enlarge::{enlarge, enlarged, nearest};
 pub use filter::{RealSurface, filter_difference, smoothed_difference};
 pub use final_filter::filter_finally;
 pub use flip::{flip, flip_map};

@@ -1,31 +1,28 @@
 //! The newest frame, over and over.
 
-use std::borrow::Cow;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use glam::{DMat4, DVec3};
 
+use super::clock::Clock;
 use super::held_pose::{HeldPose, Placed};
 use super::intake::{Arrived, Intake};
 use super::ray_budget::RayBudget;
-use super::report::{Became, Fineness, LiveSeconds, LiveStats, Tally};
+use super::report::{Became, LiveSeconds, LiveStats, Tally};
 use super::rest::Rest;
+use super::running::{Rendered, Running, View};
 use super::slot::Fetched;
 use super::{LiveError, LiveEvent, LiveFrame, LiveOptions};
 use crate::film::Picture;
 use crate::output::{ExrLayers, picture_codes8};
 use crate::pack::next_anchor;
-use crate::renderer::{
-    Budget, Delivered, Filter, FrameEdit, NeighbourView, Renderer, RendererOptions, Watcher,
-};
+use crate::renderer::{FrameEdit, NeighbourView, Renderer, Watcher};
 use crate::scene::Composite;
 use crate::scene::trajectory::{CameraPath, FrameName, Intrinsics, read_intrinsics};
 use crate::scene::{
-    Camera, Content, ContentHash, EncodedPhoto, FocusPath, Given, MotionBlurMethod, Object, Photo,
-    Scene, load_with,
+    Camera, Content, ContentHash, EncodedPhoto, FocusPath, Given, Photo, Scene, load_with,
 };
-use crate::stages::{Finished, GpuStages, finish};
 use crate::tracking::{Follower, KnownBoard, Lens, Luma, read_known_board};
 use crate::video::{FrameOutput, FrameSink, Pixels, SinkPlan, VideoFrame, decode_yuv};
 
@@ -170,13 +167,6 @@ struct Standing {
     rests: bool,
 }
 
-struct Running {
-    renderer: Renderer,
-    gpu: Option<GpuStages>,
-    /// Notes of the renderer that were told.
-    notes: usize,
-}
-
 impl Live<'_> {
     /// `None`: nothing is written.
     fn sink(&mut self) -> Result<Option<&mut FrameSink>, LiveError> {
@@ -279,13 +269,17 @@ impl Live<'_> {
                     }
                 };
                 let standing = Standing { camera, rests };
-                let (picture, fineness) =
-                    self.render(&mut started, standing, &frame.photo, number, &mut seconds)?;
+                let Rendered {
+                    picture,
+                    fineness,
+                    grows,
+                    ..
+                } = self.render(&mut started, standing, &frame.photo, number, &mut seconds)?;
                 clock.lap();
                 self.write(&name, &picture, &frame)?;
                 seconds.write = clock.lap();
                 // The first frame also waited for the scene's trees.
-                if !is_first {
+                if !is_first && !grows {
                     self.budget.took(&seconds);
                 }
                 match placed {
@@ -348,7 +342,7 @@ impl Live<'_> {
         photo: &Photo,
         number: u32,
         seconds: &mut LiveSeconds,
-    ) -> Result<(Picture, Fineness), LiveError> {
+    ) -> Result<Rendered, LiveError> {
         let world_from_camera = camera.world_from_camera;
         let time_secs = match self.rate {
             Some(rate) => f64::from(number) / rate,
@@ -361,22 +355,13 @@ impl Live<'_> {
         let camera_path = CameraPath::new(keys.chain([(time_secs, world_from_camera)]).collect());
         let position = world_from_camera.w_axis.truncate();
         started.anchor = Some(next_anchor(started.anchor, position));
-        let mut clock = Clock::start();
         let running = match (started.running.take(), started.scene.take()) {
             (Some(running), _) => running,
             (None, Some(scene)) => Running::begin(scene, &camera, self.options)?,
             (None, None) => unreachable!("there is a scene until it runs"),
         };
-        let Running {
-            renderer,
-            gpu,
-            notes,
-        } = started.running.insert(running);
-        clock.lap();
-        let stands = !renderer.scene().objects.iter().any(Object::is_animated);
-        let coarseness = self.budget.coarseness(rests && stands);
         let edit = FrameEdit {
-            photo: Some(photo.clone()),
+            photo: None,
             camera,
             lens: crate::scene::Lens {
                 focus_distance_m: focus_m.unwrap_or(started.lens.focus_distance_m),
@@ -386,60 +371,29 @@ impl Live<'_> {
             time_secs,
             seed: started.seed.wrapping_add(number),
             anchor: started.anchor,
-            coarseness,
+            coarseness: 1,
         };
-        renderer.set_frame(edit, &Watcher::none())?;
-        seconds.edit = clock.lap();
-        let rays = (self.budget).rays(renderer.samples_of_a_ray(), seconds.total());
-        let pixels = renderer.film().pixels.len() as u64;
-        let all = Budget::Rays(pixels * u64::from(rays));
-        renderer.advance(all, &Watcher::none())?;
-        seconds.render = clock.lap();
-        let (picture, film) = match coarseness {
-            1 => (renderer.delivered_picture(), Cow::Borrowed(renderer.film())),
-            _ => {
-                let Delivered { picture, film, .. } = renderer.delivered();
-                (picture, film)
-            }
-        };
-        seconds.composite = clock.lap();
-        let wants_motion = (renderer.scene().stages.motion_blur)
-            .is_some_and(|settings| settings.method == MotionBlurMethod::Copies);
-        let motion = before.filter(|_| wants_motion).map(|(time_secs, pose)| {
-            renderer.picture_motion(&NeighbourView {
-                world_from_camera: pose,
-                time_secs,
-            })
+        let before = before.map(|(time_secs, world_from_camera)| NeighbourView {
+            world_from_camera,
+            time_secs,
         });
-        let Finished {
-            picture,
-            notes: told,
-            added: _,
-            seconds: of_stages,
-        } = finish(
-            picture,
-            &film,
-            renderer.scene(),
+        let view = View {
+            photo,
+            edit,
             number,
-            motion.as_ref(),
-            gpu.as_ref(),
-        );
-        seconds.stages = of_stages;
-        let all = renderer.notes();
-        for note in all.iter().skip(*notes) {
+            rests,
+            before,
+        };
+        let running = started.running.insert(running);
+        let rendered = running.render(view, &mut self.budget, seconds)?;
+        let [of_renderer, of_stages] = &rendered.notes;
+        // Those of the stages come with each frame.
+        let first = self.tally.written() == 0;
+        let told = of_stages.iter().filter(|_| first);
+        for note in of_renderer.iter().chain(told) {
             (self.hear)(&LiveEvent::Note(note));
         }
-        if self.tally.written() == 0 {
-            for note in &told {
-                (self.hear)(&LiveEvent::Note(note));
-            }
-        }
-        *notes = all.len();
-        let fineness = Fineness {
-            rays_per_pixel: f64::from(rays) / f64::from(coarseness.pow(2)),
-            coarseness,
-        };
-        Ok((picture, fineness))
+        Ok(rendered)
     }
 
     fn close_window(&mut self, began: &mut Instant) {
@@ -454,51 +408,13 @@ impl Live<'_> {
             sink.finish()?;
         }
         let running = self.started.and_then(|started| started.running);
-        let renderer = running.map(|running| running.renderer);
+        let renderer = running.as_ref().map(Running::renderer);
         Ok(LiveStats {
             total: self.tally.total(self.begin.elapsed().as_secs_f64()),
             windows: self.tally.windows,
             seconds: self.tally.seconds,
-            backend: renderer
-                .as_ref()
-                .map_or("none", Renderer::backend_name)
-                .to_owned(),
-            device: renderer
-                .map_or_else(|| "nothing".to_owned(), |renderer| renderer.device_name()),
+            backend: renderer.map_or("none", Renderer::backend_name).to_owned(),
+            device: renderer.map_or_else(|| "nothing".to_owned(), Renderer::device_name),
         })
-    }
-}
-
-impl Running {
-    /// Builds what the first pose needs.
-    fn begin(mut scene: Scene, camera: &Camera, options: &LiveOptions) -> Result<Self, LiveError> {
-        scene.camera = camera.clone();
-        let with = RendererOptions {
-            filter: options.filter.then_some(Filter::Preview),
-            draft: true,
-            ..RendererOptions::default()
-        };
-        let renderer = Renderer::new(scene, with, &Watcher::none())?;
-        Ok(Self {
-            gpu: renderer.gpu_device().cloned().map(GpuStages::new),
-            renderer,
-            notes: 0,
-        })
-    }
-}
-
-/// Takes times one after the other.
-struct Clock(Instant);
-
-impl Clock {
-    fn start() -> Self {
-        Self(Instant::now())
-    }
-
-    /// Seconds since the last lap.
-    fn lap(&mut self) -> f64 {
-        let seconds = self.0.elapsed().as_secs_f64();
-        self.0 = Instant::now();
-        seconds
     }
 }

@@ -4,12 +4,15 @@
 //! finely and with as many rays as the frame's time allows, and writes. So the age of what goes out does not grow, however long it runs.
 
 mod ages;
+mod clock;
 mod driver;
 mod held_pose;
 mod intake;
 mod ray_budget;
 mod report;
 mod rest;
+mod resting;
+mod running;
 mod slot;
 
 use std::path::PathBuf;

@@ -10,6 +10,8 @@ const FILLED: f64 = 0.9;
 const ROOMY: f64 = 0.75;
 /// The most that the samples grow by from one frame to the next.
 const GROWTH: f64 = 1.5;
+/// Of the time of a frame, what a picture that grows gets at least.
+const REFINING: f64 = 0.2;
 /// Of what the whole picture takes beside its rays, what a coarser one takes for being enlarged.
 const ENLARGING: f64 = 0.1;
 
@@ -62,6 +64,12 @@ pub struct RayBudget {
     whole_samples: f64,
     /// Those that the last frame took.
     taken: f64,
+    /// Seconds of a composite over a photograph, running mean.
+    composite: Option<f64>,
+    /// Seconds that rays of a growing picture are given at least.
+    least_secs: f64,
+    /// Seconds that rays of a growing picture took beyond those that they were given, running mean.
+    overrun: f64,
 }
 
 impl RayBudget {
@@ -75,11 +83,14 @@ impl RayBudget {
             costs: None,
             whole_samples: 0.0,
             taken: 0.0,
+            composite: None,
+            least_secs: REFINING * frame_secs,
+            overrun: 0.0,
         }
     }
 
-    /// By what the sides of the next frame's picture are divided, so that there is time for a ray per pixel of it; 1 where the camera rests.
-    pub fn coarseness(&mut self, rests: bool) -> u32 {
+    /// By what the sides of the next frame's picture are divided, so that there is time for a ray per pixel of it.
+    pub fn coarseness(&mut self) -> u32 {
         let fits = |coarseness: &u32, share: f64| {
             self.costs.is_none_or(|costs| {
                 let samples = self.whole_samples / f64::from(coarseness.pow(2));
@@ -90,10 +101,7 @@ impl RayBudget {
         };
         let finer = (1..self.coarseness).find(|finer| fits(finer, ROOMY));
         let coarser = || (self.coarseness..self.coarsest).find(|other| fits(other, FILLED));
-        self.coarseness = match rests {
-            true => 1,
-            false => finer.or_else(coarser).unwrap_or(self.coarsest),
-        };
+        self.coarseness = finer.or_else(coarser).unwrap_or(self.coarsest);
         self.coarseness
     }
 
@@ -111,6 +119,28 @@ impl RayBudget {
         let rays = (rays as u32).clamp(1, self.most);
         self.taken = f64::from(rays) * samples;
         rays
+    }
+
+    /// A composite over a photograph took so long.
+    pub fn composited(&mut self, secs: f64) {
+        let mean = self.composite.unwrap_or(secs);
+        self.composite = Some(mean + NEWEST * (secs - mean));
+    }
+
+    /// Seconds for the rays of a picture that grows over frames, where so many of this frame have passed.
+    pub fn left_at_rest(&self, spent_secs: f64) -> f64 {
+        let after = self.costs.map_or(0.0, |costs| costs.after);
+        let to_come = self.composite.unwrap_or(0.0) + after + self.overrun;
+        let left = FILLED * self.frame_secs - spent_secs - to_come;
+        left.max(self.least_secs)
+    }
+
+    /// Rays of a growing picture that were given so many seconds took so many. Where the time was over before the first of them, the next get more.
+    pub fn refined(&mut self, given_secs: f64, secs: f64, any: bool) {
+        if !any {
+            self.least_secs *= 2.0;
+        }
+        self.overrun += NEWEST * ((secs - given_secs).max(0.0) - self.overrun);
     }
 
     /// What the frame took.
@@ -144,8 +174,8 @@ mod tests {
 
     impl Machine {
         /// A frame in whose whole picture so many pixels change; coarseness, rays per pixel and seconds.
-        fn frame(self, budget: &mut RayBudget, pixels: u64, rests: bool) -> (u32, u32, f64) {
-            let coarseness = budget.coarseness(rests);
+        fn frame(self, budget: &mut RayBudget, pixels: u64) -> (u32, u32, f64) {
+            let coarseness = budget.coarseness();
             let samples = pixels / u64::from(coarseness.pow(2));
             let share = share_of(coarseness);
             let mut seconds = LiveSeconds {
@@ -163,9 +193,9 @@ mod tests {
         /// The last of many.
         fn settled(self, budget: &mut RayBudget, pixels: u64) -> (u32, u32, f64) {
             for _ in 0..60 {
-                self.frame(budget, pixels, false);
+                self.frame(budget, pixels);
             }
-            self.frame(budget, pixels, false)
+            self.frame(budget, pixels)
         }
     }
 
@@ -208,9 +238,9 @@ mod tests {
         assert!(settled(1).2 > 0.19, "control: the whole picture");
     }
 
-    /// A view of which four times as much changes costs no more than its time from its second frame on; at rest the whole picture is shown.
+    /// A view of which four times as much changes costs no more than its time from its second frame on.
     #[test]
-    fn work_follows_the_view_and_rest_shows_the_whole_picture() {
+    fn work_follows_the_view() {
         let machine = Machine {
             picture: 0.04,
             sample: 5e-7,
@@ -218,12 +248,29 @@ mod tests {
         let mut budget = RayBudget::new(0.066, 64, 4);
         let (near, _, _) = machine.settled(&mut budget, PIXELS / 4);
         assert_eq!(near, 1);
-        let (_, rays, late) = machine.frame(&mut budget, PIXELS, false);
+        let (_, rays, late) = machine.frame(&mut budget, PIXELS);
         assert!(rays == 1 && late > 0.066, "{late}");
-        let (coarseness, _, secs) = machine.frame(&mut budget, PIXELS, false);
+        let (coarseness, _, secs) = machine.frame(&mut budget, PIXELS);
         assert!(coarseness > 1 && secs < 0.066, "{coarseness} {secs}");
-        assert_eq!(machine.frame(&mut budget, PIXELS, true).0, 1);
-        assert_eq!(machine.frame(&mut budget, PIXELS, false).0, coarseness);
+        assert_eq!(machine.frame(&mut budget, PIXELS).0, coarseness);
+    }
+
+    #[test]
+    fn a_picture_that_grows_gets_what_is_left_of_a_frame_and_a_fifth_at_least() {
+        let mut budget = RayBudget::new(0.1, 64, 4);
+        assert!((budget.left_at_rest(0.02) - 0.07).abs() < 1e-9);
+        budget.composited(0.03);
+        assert!((budget.left_at_rest(0.02) - 0.04).abs() < 1e-9);
+        budget.took(&LiveSeconds {
+            write: 0.01,
+            ..LiveSeconds::default()
+        });
+        assert!((budget.left_at_rest(0.02) - 0.03).abs() < 1e-9);
+        assert!((budget.left_at_rest(0.2) - 0.02).abs() < 1e-9);
+        (0..50).for_each(|_| budget.refined(0.02, 0.035, true));
+        assert!((budget.left_at_rest(0.01) - 0.025).abs() < 1e-6, "overrun");
+        budget.refined(0.02, 0.02, false);
+        assert!((budget.left_at_rest(0.2) - 0.04).abs() < 1e-9, "none came");
     }
 
     /// Where a finer picture nearly fits, its size does not change to and fro.
@@ -238,7 +285,7 @@ mod tests {
         let sizes: Vec<u32> = (0..40)
             .map(|frame| {
                 let pixels = PIXELS + PIXELS / 20 * (frame % 5);
-                machine.frame(&mut budget, pixels, false).0
+                machine.frame(&mut budget, pixels).0
             })
             .collect();
         let changes = sizes.windows(2).filter(|pair| pair[0] != pair[1]).count();

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::backend::Backend;
 use super::photo_albedo::PhotoLight;
@@ -198,7 +199,7 @@ impl Core {
 
     /// Rays per pixel that every pixel within reach has taken; `None`: there is no such pixel.
     pub fn samples(&self) -> Option<u32> {
-        let pixels = self.film.pixels.iter().zip(&self.packed.pixels);
+        let pixels = self.film.pixels.par_iter().zip(&self.packed.pixels);
         pixels
             .filter(|(_, info)| is_within_reach(info))
             .map(|(sums, _)| sums.n / sums.sample_factor.max(1))
@@ -254,20 +255,21 @@ impl<'a> Way<'a> {
     /// From where the film stands to `end`, in rays per pixel.
     pub fn to(end: u32, core: &mut Core, watcher: &Watcher<'a>) -> Self {
         let begun = core.places.begin();
-        let (mut taken, mut factors) = (0, 0);
         let samples_total = end - core.film.first_sample;
-        let mut samples = None;
-        for (sums, info) in core.film.pixels.iter().zip(&core.packed.pixels) {
-            if is_within_reach(info) {
+        let pixels = core.film.pixels.par_iter().zip(&core.packed.pixels);
+        let (taken, factors, samples) = pixels
+            .filter(|(_, info)| is_within_reach(info))
+            .map(|(sums, _)| {
                 let factor = sums.sample_factor.max(1);
-                taken += u64::from(sums.n);
-                factors += u64::from(factor);
-                let of_pixel = sums.n / factor;
-                samples = Some(samples.unwrap_or(of_pixel).min(of_pixel));
-            }
-        }
+                (u64::from(sums.n), u64::from(factor), sums.n / factor)
+            })
+            .reduce(
+                || (0, 0, u32::MAX),
+                |a, b| (a.0 + b.0, a.1 + b.1, a.2.min(b.2)),
+            );
         let wanted = u64::from(samples_total) * factors;
-        let samples = samples.unwrap_or(samples_total);
+        // Where there is no such pixel all is done.
+        let samples = if factors == 0 { samples_total } else { samples };
         core.places.end(Place::List, begun);
         Self {
             watcher: *watcher,

@@ -45,6 +45,8 @@ mod tiles;
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 pub use adaptive::{SCRAMBLES, Stated};
 pub use budget::Budget;
 pub use frames::FrameEdit;
@@ -309,7 +311,7 @@ impl Renderer {
     /// Samples that one ray per pixel takes, in all pixels within reach of something virtual.
     pub fn samples_of_a_ray(&self) -> u64 {
         let Core { film, packed, .. } = &self.core;
-        let pixels = film.pixels.iter().zip(&packed.pixels);
+        let pixels = film.pixels.par_iter().zip(&packed.pixels);
         pixels
             .filter(|(_, info)| core::is_within_reach(info))
             .map(|(sums, _)| u64::from(sums.sample_factor.max(1)))

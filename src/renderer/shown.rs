@@ -7,7 +7,7 @@ use super::{Filter, Renderer};
 use crate::cpu::estimator::evaluations_before;
 use crate::film::{
     Combined, Film, GROUPS, Picture, Planes, combine_robustly, composite, composite_smoothed,
-    enlarged, estimated_error, filter_difference, filter_finally, group_counts, planes,
+    enlarge, enlarged, estimated_error, filter_difference, filter_finally, group_counts, planes,
     smoothed_difference,
 };
 use crate::scene::Composite;
@@ -63,8 +63,9 @@ impl Renderer {
         }
     }
 
-    /// The picture as it is delivered: with the scene's combination of samples, or filtered.
-    pub fn delivered(&self) -> Delivered<'_> {
+    /// The film as it is delivered, of the size that is traced: with the scene's combination of samples, or filtered; and the share of the difference that
+    /// the robust combination moved.
+    fn combined(&self) -> (Cow<'_, Film>, Option<f64>) {
         let film = &self.core.film;
         // A quotient multiplies the photograph, whose grain would come into the difference as well.
         let photo = match self.core.scene.settings.composite {
@@ -72,7 +73,7 @@ impl Renderer {
             Composite::Quotient => None,
         };
         let counts = |pixel| self.group_counts(pixel);
-        let (film, moved) = match self.core.options.filter {
+        match self.core.options.filter {
             Some(Filter::Final) => {
                 let film = filter_finally(film, photo, &self.surfaces, counts);
                 (Cow::Owned(film), None)
@@ -82,12 +83,26 @@ impl Renderer {
                 (Cow::Owned(film), Some(moved))
             }
             Some(Filter::Preview) | None => (self.shown(), None),
-        };
+        }
+    }
+
+    /// The picture as it is delivered.
+    pub fn delivered(&self) -> Delivered<'_> {
+        let (film, moved) = self.combined();
         let film = self.whole(film);
         Delivered {
             picture: self.composited(&film),
             film,
             moved,
+        }
+    }
+
+    /// The film of [`Delivered`] in place of what `whole` held, which has the camera's size: memory that is there is used again.
+    pub fn deliver_into(&self, whole: &mut Film) {
+        let (film, _) = self.combined();
+        match self.is_coarse() {
+            true => enlarge(&film, self.core.scene.settings.composite, whole),
+            false => *whole = film.into_owned(),
         }
     }
 

@@ -107,10 +107,13 @@ impl<'a> Watcher<'a> {
         }
     }
 
-    /// It also ends what runs at this time.
+    /// It also ends what runs at this time, in place of another that it had; `None` changes nothing.
     #[must_use]
-    pub const fn until(self, deadline: Option<Instant>) -> Self {
-        Self { deadline, ..self }
+    pub fn until(self, deadline: Option<Instant>) -> Self {
+        Self {
+            deadline: deadline.or(self.deadline),
+            ..self
+        }
     }
 
     /// It lets all run to its end.

@@ -165,6 +165,16 @@ fn differs(a: &[u8], b: &[u8]) -> Vec<bool> {
     pairs.map(|(a, b)| a != b).collect()
 }
 
+/// That `changed` holds pixels only where `fine` does, or 12 pixels beside.
+fn assert_near(changed: &[bool], fine: &[bool]) {
+    let is_near = |pixel: usize| {
+        let (x, y) = (pixel % 480, pixel / 480);
+        (y.saturating_sub(12)..(y + 13).min(360))
+            .any(|y| (x.saturating_sub(12)..(x + 13).min(480)).any(|x| fine[480 * y + x]))
+    };
+    assert!((0..480 * 360).all(|pixel| !changed[pixel] || is_near(pixel)));
+}
+
 /// Where there is no time, pictures are coarser: what they change lies where the whole picture changes the frame or next to it, and all else is the
 /// stream's to the bit. Control: the whole picture is another one.
 #[test]
@@ -188,13 +198,8 @@ fn pictures_that_do_not_fit_into_their_time_are_coarser_and_change_nothing_else(
         differs(frames[last], &whole[last]),
         differs(frames[last], &coarse[last]),
     );
-    let is_near = |pixel: usize| {
-        let (x, y) = (pixel % 480, pixel / 480);
-        (y.saturating_sub(12)..(y + 13).min(360))
-            .any(|y| (x.saturating_sub(12)..(x + 13).min(480)).any(|x| fine[480 * y + x]))
-    };
     let count = |changed: &[bool]| changed.iter().filter(|changed| **changed).count();
-    assert!((0..480 * 360).all(|pixel| !rough[pixel] || is_near(pixel)));
+    assert_near(&rough, &fine);
     let share = count(&rough) as f64 / count(&fine) as f64;
     assert!((0.9..2.0).contains(&share), "{share}");
     let between = count(&differs(&whole[last], &coarse[last]));
@@ -203,6 +208,40 @@ fn pictures_that_do_not_fit_into_their_time_are_coarser_and_change_nothing_else(
         coarse[3], frames[3],
         "without a pose a frame passes through"
     );
+}
+
+/// A camera that rests gets the whole picture, however little time a frame has, while frames go on: that of one frame to the bit. Control: before, they
+/// are coarse.
+#[test]
+fn the_picture_of_a_resting_camera_grows_until_it_is_whole() {
+    let (folder, stream) = prepared();
+    let (header, frames) = parts(&stream);
+    let line = |flags: &str| LIVE.replace("--rpp 2", "--rpp 1 ") + flags;
+    let whole = in_step(&folder, &line("--fps 10000 --coarsest 1"), &stream);
+    let mut child = begin(&folder, &line("--fps 100"));
+    let (mut to, mut from) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+    to.write_all(header).unwrap();
+    to.write_all(frames[0]).unwrap();
+    from.read_exact(&mut vec![0; header.len()]).unwrap();
+    let mut next = |is_last: bool| {
+        let mut frame = vec![0; frames[0].len()];
+        from.read_exact(&mut frame).unwrap();
+        if !is_last {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            to.write_all(frames[0]).unwrap();
+        }
+        frame
+    };
+    // What two frames take is not known beforehand.
+    (0..4).for_each(|_| drop(next(false)));
+    let coarse = next(false);
+    assert!(changed(&coarse, &whole[0]) > 100, "control");
+    let grown = (0..2000).any(|_| next(false) == whole[0]);
+    assert!(grown, "it does not become the whole picture");
+    assert!(next(true) == whole[0], "it stays");
+    drop(to);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
 }
 
 #[test]
