@@ -3,6 +3,9 @@
 /// Seconds after which a picture that has all its rays is begun anew, from the newest photograph.
 const RENEWED_SECS: f64 = 2.0;
 
+/// Rays per pixel that the first picture is shown with: one tells no rare bright sample from light, and shows each as a speckle.
+const FIRST_RAYS: u32 = 2;
+
 /// What a frame does for the picture of the whole size, beside showing what is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
@@ -16,7 +19,7 @@ pub enum Step {
     Keep,
 }
 
-/// Where the picture of a resting camera stands. Its first one is shown with one ray per pixel, two, four and so on; those that follow once they have as
+/// Where the picture of a resting camera stands. Its first one is shown with two rays per pixel, four, eight and so on; those that follow once they have as
 /// many as it.
 #[derive(Clone, Debug, Default)]
 pub struct Resting {
@@ -34,7 +37,7 @@ impl Resting {
         match self.begun {
             None => {
                 self.begun = Some(secs);
-                self.due = 1;
+                self.due = FIRST_RAYS;
                 Step::Begin
             }
             Some(begun) if self.is_whole && secs - begun < RENEWED_SECS => Step::Keep,
@@ -82,7 +85,7 @@ mod tests {
     fn the_first_picture_is_shown_as_it_doubles_and_the_next_with_all_its_rays() {
         let steps = steps(6, 45);
         assert_eq!(steps[0].0, Step::Begin);
-        assert_eq!(shown(&steps), [1, 2, 4, 6, 6]);
+        assert_eq!(shown(&steps), [2, 4, 6, 6]);
         let begun = steps.iter().filter(|(step, _)| *step == Step::Begin);
         assert_eq!(begun.count(), 3);
     }
