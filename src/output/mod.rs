@@ -9,6 +9,7 @@ mod exr_text;
 mod extension;
 mod film_file;
 mod film_note;
+mod kept_codes;
 mod layers;
 mod metadata;
 mod plain;
