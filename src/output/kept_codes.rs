@@ -12,11 +12,11 @@ use crate::scene::srgb::decode8;
 
 /// The mean change around, codes, below which ...
 const KEPT_MEAN_CODES: f64 = 0.85;
-/// ... the photograph's code stays if the pixel's own change is less than this.
-const KEPT_CODES: f64 = 1.5;
+/// ... the photograph's code stays if the pixel's own change is less than this, which is rounded to one code at most.
+const KEPT_CODES: f64 = 1.4;
 /// Larger changes are no part of the mean: there something virtual begins.
-const AVERAGED_CODES: f64 = 3.0;
-/// The mean is that of the pixels so far in every direction.
+const AVERAGED_CODES: f64 = 2.5;
+/// The mean is that of the pixels so far away in every direction.
 const REACH_PX: usize = 4;
 
 /// Changes are held in shares of a code: sums of integers are the same in any order.

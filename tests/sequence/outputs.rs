@@ -3,8 +3,10 @@
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-use mixray::output::ChannelFile;
-use mixray::scene::srgb::{encode8, encode8_near};
+use mixray::film::Picture;
+use mixray::output::{ChannelFile, PngBits, Target, write_png};
+use mixray::scene::Photo;
+use mixray::scene::srgb::encode8;
 
 use super::support::{BALL, sequence, y4m};
 use crate::support::{Folder, stderr};
@@ -36,13 +38,19 @@ fn exr_frames_are_the_png_frames_with_layers() {
         let picture = folder.open(&format!("png/f_{number:04}.png"));
         let expected: Vec<[u8; 3]> = picture.pixels().map(|pixel| pixel.0).collect();
         let photo = folder.open(&format!("in/f_{number:04}.png"));
-        let own: Vec<[u8; 3]> = photo.pixels().map(|pixel| pixel.0).collect();
+        let own = photo.pixels().map(|pixel| pixel.0).collect();
+        let photo = Photo::from_srgb8(photo.width(), photo.height(), own);
         let file = ChannelFile::read(&folder.path(&pattern)).expect("reads");
-        let rgb = file.rgb(["R", "G", "B"]).expect("R, G and B");
-        // A channel near the photograph's code keeps it; half floats may fall on the other side of a code's edge.
-        let near =
-            |(value, own): (&[f32; 3], &[u8; 3])| [0, 1, 2].map(|c| encode8_near(value[c], own[c]));
-        let found: Vec<[u8; 3]> = rgb.iter().zip(&own).map(near).collect();
+        let picture = Picture {
+            width: photo.width,
+            height: photo.height,
+            linear: file.rgb(["R", "G", "B"]).expect("R, G and B"),
+        };
+        let target = Target::picture(&folder.path("of-exr.png")).expect("writable");
+        write_png(&target, &picture, Some(&photo), PngBits::Eight).expect("writes");
+        // Half floats may fall on the other side of a code's edge.
+        let found = folder.open("of-exr.png");
+        let found: Vec<[u8; 3]> = found.pixels().map(|pixel| pixel.0).collect();
         let pairs = found.as_flattened().iter().zip(expected.as_flattened());
         let off: Vec<u8> = pairs.map(|(a, b)| a.abs_diff(*b)).collect();
         let equal = off.iter().filter(|d| **d == 0).count();
