@@ -128,6 +128,7 @@ impl Renderer {
             }
         }
         if from_photo {
+            core.packed.taught = None;
             let kept = (core.photo_light.as_ref()).filter(|_| core.options.draft);
             core.photo_here = kept.and_then(|light| light.take_up(&mut core.packed, photo));
             if core.photo_here.is_some() {
