@@ -24,6 +24,8 @@ pub(super) struct Core {
     /// Of the frames of a video, and of a scene that is edited.
     pub lens_grid: Option<LensGrid>,
     pub film: Film,
+    /// No pixel of the film has a sample, and its plan is the packed scene's.
+    pub film_is_new: bool,
     pub backend: Backend,
     pub options: RendererOptions,
     pub rays: RayCounts,
@@ -105,6 +107,7 @@ impl Core {
 
     /// Takes the samples of a list. A device that is lost is replaced by the CPU, which takes what is left.
     pub fn take(&mut self, work: &WorkList, watcher: &Watcher<'_>) -> Result<(), RenderError> {
+        self.film_is_new = false;
         if let Some(gpu) = self.backend.gpu_mut() {
             match gpu.render(&mut self.film, work, &mut self.rays, watcher) {
                 Err(error @ GpuError::Lost(_)) => {
@@ -170,7 +173,10 @@ impl Core {
     /// The samples of the main pass that lie before `end_of_row`, in rays per pixel.
     pub fn main_work(&mut self, end_of_row: impl Fn(usize) -> u32 + Sync) -> WorkList {
         let begun = self.places.begin();
-        let work = WorkList::main(&self.packed.pixels, &self.film, end_of_row);
+        let work = match self.film_is_new {
+            true => WorkList::first(&self.packed.pixels, &self.film, end_of_row),
+            false => WorkList::main(&self.packed.pixels, &self.film, end_of_row),
+        };
         self.places.end(Place::List, begun);
         work
     }
@@ -257,12 +263,19 @@ impl<'a> Way<'a> {
         let (mut taken, mut factors) = (0, 0);
         let samples_total = end - core.film.first_sample;
         let mut samples = None;
-        for (sums, info) in core.film.pixels.iter().zip(&core.packed.pixels) {
+        for (pixel, info) in core.packed.pixels.iter().enumerate() {
             if is_within_reach(info) {
-                let factor = sums.sample_factor.max(1);
-                taken += u64::from(sums.n);
+                // A film is large: where it is new, it is not looked at.
+                let (of_pixel, factor) = match core.film_is_new {
+                    true => (0, info.sample_factor.max(1)),
+                    false => {
+                        let sums = &core.film.pixels[pixel];
+                        (sums.n, sums.sample_factor.max(1))
+                    }
+                };
+                taken += u64::from(of_pixel);
                 factors += u64::from(factor);
-                let of_pixel = sums.n / factor;
+                let of_pixel = of_pixel / factor;
                 samples = Some(samples.unwrap_or(of_pixel).min(of_pixel));
             }
         }

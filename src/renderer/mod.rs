@@ -233,6 +233,7 @@ impl Renderer {
                 packed,
                 lens_grid: None,
                 film,
+                film_is_new: false,
                 backend: Backend::Undecided,
                 options,
                 rays: RayCounts::default(),

@@ -249,6 +249,7 @@ impl Renderer {
         let grouped = core.options.keeps_groups(core.scene.settings.combine);
         core.film.set_groups(grouped);
         core.film.set_photons(core.packed.photons_per_ray > 0);
+        core.film_is_new = true;
         core.places.end(Place::Film, begun);
         match (core.options.filter, core.options.draft) {
             (None, _) => {}
