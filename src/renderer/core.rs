@@ -40,8 +40,6 @@ pub(super) struct Core {
     pub photo_light: Option<PhotoLight>,
     /// The same as the present camera sees it.
     pub photo_here: Option<PhotoLight>,
-    /// Share of the light of virtual pixels that comes from the photograph as their backdrop.
-    pub backdrop_share: Option<f64>,
     /// The picture's time.
     pub time_secs: f64,
     /// The pilot was not ended by its watcher.
