@@ -215,7 +215,7 @@ pub(super) fn run(job: Job) -> Result<Outcome, Failure> {
         write_text(path, &stats.to_json())?;
     }
     let aims = goal.is_some_and(|goal| !goal.takes_all_rays());
-    summarize(&summary::text(&renderer, &stats, &targets, aims, moved))?;
+    summarize(&summary::text(&mut renderer, &stats, &targets, aims, moved))?;
     if job.range.is_some() && interrupted.is_set() {
         say("warning", "the range is not complete: it cannot be merged");
     }

@@ -5,12 +5,13 @@ use crate::renderer::{Filter, Renderer, SCRAMBLES, Stated, Stats};
 
 /// `to_goal`: the render could end before its rays were spent. `moved`: by the robust combination.
 pub(super) fn text(
-    renderer: &Renderer,
+    renderer: &mut Renderer,
     stats: &Stats,
     targets: &[Target],
     to_goal: bool,
     moved: Option<f64>,
 ) -> String {
+    let backdrop_share = renderer.backdrop_share();
     let film = renderer.film();
     let rays = match renderer.stated() {
         Some(stated) => format!(
@@ -36,7 +37,7 @@ pub(super) fn text(
         ),
     };
     out += &lines(stats, &error);
-    if let Some(share) = renderer.backdrop_share() {
+    if let Some(share) = backdrop_share {
         out += &format!(
             "photo   {:.0}% of the light of virtual pixels is the photograph's, seen where nothing is modelled ([photo] backdrop)\n",
             100.0 * share

@@ -45,6 +45,8 @@ impl Beside {
 pub struct Home {
     pub batches: usize,
     pub slots: Range<usize>,
+    /// The sums began at 0 on the device.
+    pub from_zero: bool,
 }
 
 /// Buffers for up to `capacity` pixels.
@@ -203,12 +205,16 @@ impl Slots {
                 let (sums, rest) = rest.split_at(sums as usize);
                 let (guides, groups) = rest.split_at(guides as usize);
                 for (work, sums) in work.iter().zip(sums.chunks_exact(size_of::<PixelSums>())) {
-                    // The device does not know the factor where it began with cleared sums.
                     let kept = &mut film.pixels[work.pixel as usize];
-                    *kept = PixelSums {
-                        sample_factor: kept.sample_factor,
-                        ..bytemuck::pod_read_unaligned(sums)
-                    };
+                    // What the device does not know where it began with cleared sums: the factor, and photons that were left out.
+                    let (factor, left_out, first) =
+                        (kept.sample_factor, kept.non_finite, kept.first_non_finite);
+                    *kept = bytemuck::pod_read_unaligned(sums);
+                    kept.sample_factor = factor;
+                    if home.from_zero && left_out > 0 {
+                        kept.non_finite += left_out;
+                        kept.first_non_finite = first;
+                    }
                 }
                 put(&mut film.guides, work, guides);
                 put(&mut film.groups, work, groups);

@@ -51,6 +51,7 @@ impl PackedScene {
 
     /// Fills the frame's spheres about smooth virtual surfaces and the lights' shares of the photons. Wants the lights packed.
     pub(super) fn pack_photons(&mut self) {
+        self.taught = None;
         self.frame.photon_sphere_count = 0;
         self.frame.photon_spheres = [[0.0; 4]; MAX_PHOTON_SPHERES + 1];
         self.frame.env_traced_above = f32::INFINITY;

@@ -14,6 +14,8 @@ pub use records::*;
 
 use std::ops::Range;
 
+use glam::DMat4;
+
 use crate::accel::{Cover, WorldBvh};
 pub use crate::shared::NONE;
 
@@ -48,6 +50,8 @@ pub struct PackedScene {
     pub photo_albedo: Vec<[f32; 4]>,
     /// Lobes of the cells of `light::guide`: the point that each is about and 1 - cos of its half-angle, 0 where a cell has no more.
     pub guide: Vec<[f32; 4]>,
+    /// What it was filled with the last time, as long as photons would teach the same.
+    pub(crate) taught: Option<Taught>,
     /// What rough lobes keep of light: metal, then the glasses (see `material::facets`); empty where none is rough.
     pub facet_tables: Vec<f32>,
     /// Indices of the glasses in it, as bits, and where their tables begin.
@@ -69,8 +73,10 @@ pub struct PackedScene {
     pub(crate) resting_covers: Vec<Cover>,
     /// Over those of them that are smooth.
     pub(crate) resting_smooth_covers: Vec<Cover>,
-    /// Of a draft: the virtual objects' that were found so far.
-    pub(crate) object_covers: Option<Vec<ObjectCover>>,
+    /// Those of the virtual objects that were found so far, each once.
+    pub(crate) object_covers: Vec<ObjectCover>,
+    /// Spheres may be loose, and trees worn.
+    pub(crate) is_draft: bool,
     pub(crate) env_mean_luminance: f64,
     pub(crate) env_traced: TracedEnvironment,
     /// Half-angle at which the lights that send photons show at smooth objects, radians: a mean by their shares, of each at its largest.
@@ -90,12 +96,25 @@ pub struct TracedEnvironment {
     pub solid_angle_sr: f64,
 }
 
-/// Spheres about a virtual object, in its own space.
+/// What photons have taught of the scene, wherever the camera is.
+pub(crate) struct Taught {
+    /// How many, their seed, the frame's flags and the most bounces.
+    pub photons: [u32; 4],
+    pub guide: Vec<[f32; 4]>,
+    pub guide_cell_count: u32,
+    pub guide_cells_per_m: f32,
+}
+
+/// Spheres about a virtual object.
 pub(crate) struct ObjectCover {
     /// Index in the scene.
     pub object: usize,
     /// Of its triangles that rest.
     pub triangles: usize,
+    /// To the space that they were found in.
+    pub space_from_object: DMat4,
+    /// Of its parts that rest.
+    pub materials: Vec<Material>,
     pub whole: Cover,
     /// About what of it is smooth.
     pub smooth: Cover,
@@ -138,6 +157,7 @@ impl PackedScene {
             env_edges: Vec::new(),
             photo_albedo: Vec::new(),
             guide: Vec::new(),
+            taught: None,
             facet_tables: Vec::new(),
             facet_table_of: Vec::new(),
             backdrop: Vec::new(),
@@ -150,7 +170,8 @@ impl PackedScene {
             moved: None,
             resting_covers: Vec::new(),
             resting_smooth_covers: Vec::new(),
-            object_covers: None,
+            object_covers: Vec::new(),
+            is_draft: false,
             env_mean_luminance: 0.0,
             env_traced: TracedEnvironment::default(),
             photon_light_radius: 0.0,

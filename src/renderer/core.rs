@@ -25,6 +25,8 @@ pub(super) struct Core {
     /// Of the frames of a video, and of a scene that is edited.
     pub lens_grid: Option<LensGrid>,
     pub film: Film,
+    /// No pixel of the film has a sample, and its plan is the packed scene's.
+    pub film_is_new: bool,
     pub backend: Backend,
     pub options: RendererOptions,
     pub rays: RayCounts,
@@ -39,8 +41,6 @@ pub(super) struct Core {
     pub photo_light: Option<PhotoLight>,
     /// The same as the present camera sees it.
     pub photo_here: Option<PhotoLight>,
-    /// Share of the light of virtual pixels that comes from the photograph as their backdrop.
-    pub backdrop_share: Option<f64>,
     /// The picture's time.
     pub time_secs: f64,
     /// The pilot was not ended by its watcher.
@@ -106,6 +106,7 @@ impl Core {
 
     /// Takes the samples of a list. A device that is lost is replaced by the CPU, which takes what is left.
     pub fn take(&mut self, work: &WorkList, watcher: &Watcher<'_>) -> Result<(), RenderError> {
+        self.film_is_new = false;
         if let Some(gpu) = self.backend.gpu_mut() {
             match gpu.render(&mut self.film, work, &mut self.rays, watcher) {
                 Err(error @ GpuError::Lost(_)) => {
@@ -171,7 +172,10 @@ impl Core {
     /// The samples of the main pass that lie before `end_of_row`, in rays per pixel.
     pub fn main_work(&mut self, end_of_row: impl Fn(usize) -> u32 + Sync) -> WorkList {
         let begun = self.places.begin();
-        let work = WorkList::main(&self.packed.pixels, &self.film, end_of_row);
+        let work = match self.film_is_new {
+            true => WorkList::first(&self.packed.pixels, &self.film, end_of_row),
+            false => WorkList::main(&self.packed.pixels, &self.film, end_of_row),
+        };
         self.places.end(Place::List, begun);
         work
     }
@@ -256,12 +260,19 @@ impl<'a> Way<'a> {
     pub fn to(end: u32, core: &mut Core, watcher: &Watcher<'a>) -> Self {
         let begun = core.places.begin();
         let samples_total = end - core.film.first_sample;
-        let pixels = core.film.pixels.par_iter().zip(&core.packed.pixels);
+        let pixels = core.packed.pixels.par_iter().enumerate();
         let (taken, factors, samples) = pixels
             .filter(|(_, info)| is_within_reach(info))
-            .map(|(sums, _)| {
-                let factor = sums.sample_factor.max(1);
-                (u64::from(sums.n), u64::from(factor), sums.n / factor)
+            .map(|(pixel, info)| {
+                // A film is large: where it is new, it is not looked at.
+                let (n, factor) = match core.film_is_new {
+                    true => (0, info.sample_factor.max(1)),
+                    false => {
+                        let sums = &core.film.pixels[pixel];
+                        (sums.n, sums.sample_factor.max(1))
+                    }
+                };
+                (u64::from(n), u64::from(factor), n / factor)
             })
             .reduce(
                 || (0, 0, u32::MAX),

@@ -37,6 +37,7 @@ impl Renderer {
             info.sample_factor = sums.sample_factor.max(1);
         }
         renderer.core.film = film;
+        renderer.core.film_is_new = false;
         renderer.driver.replay_real(&mut renderer.core)?;
         Ok(renderer)
     }
@@ -47,6 +48,7 @@ impl Renderer {
     /// # Errors
     /// The films differ in size or planes, or their ranges leave a gap or overlap; nothing is changed then.
     pub fn merge(&mut self, other: &Film) -> Result<(), RenderError> {
+        self.core.film_is_new = false;
         self.core.film.merge(other)?;
         let end = self.core.film.first_sample + self.samples();
         self.end_sample = self.end_sample.max(end);

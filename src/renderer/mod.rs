@@ -67,6 +67,7 @@ use moving::Moving;
 use stopwatch::Stopwatch;
 
 use crate::clock::HostThreads;
+use crate::cpu;
 use crate::film::{Film, RealSurface};
 use crate::gpu::{GpuDevice, KernelSeconds, Traffic};
 use crate::packed::PackedScene;
@@ -86,8 +87,7 @@ pub struct RendererOptions {
     pub without: Without,
     /// Pictures show the difference filtered; the film is not touched.
     pub filter: Option<Filter>,
-    /// For a first look: [`Renderer::backdrop_share`], which only tells, is not estimated; albedo from the photograph follows from
-    /// the light that was found first, and bounds are looser.
+    /// For a first look: albedo from the photograph follows from the light that was found first, and bounds are looser.
     pub draft: bool,
     /// A window is drawn on the device that renders, which is left to it more often.
     pub beside_window: bool,
@@ -235,6 +235,7 @@ impl Renderer {
                 packed,
                 lens_grid: None,
                 film,
+                film_is_new: false,
                 backend: Backend::Undecided,
                 options,
                 rays: RayCounts::default(),
@@ -244,7 +245,6 @@ impl Renderer {
                 coarse_photo: None,
                 photo_light: None,
                 photo_here: None,
-                backdrop_share: None,
                 is_planned: false,
                 secs_per_ray: None,
             },
@@ -348,9 +348,10 @@ impl Renderer {
         self.core.seconds
     }
 
-    /// Share of the light of virtual pixels that they show of the photograph, where nothing is modelled behind them; estimated from a few samples.
-    pub fn backdrop_share(&self) -> Option<f64> {
-        self.core.backdrop_share
+    /// Share of the light of virtual pixels that they show of the photograph, where nothing is modelled behind them; estimated from a few samples,
+    /// anew at each call.
+    pub fn backdrop_share(&mut self) -> Option<f64> {
+        cpu::backdrop_share(&mut self.core.packed)
     }
 
     /// Things the user should hear: fallbacks taken, values fitted.

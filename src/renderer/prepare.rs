@@ -128,6 +128,7 @@ impl Renderer {
             }
         }
         if from_photo {
+            core.packed.taught = None;
             let kept = (core.photo_light.as_ref()).filter(|_| core.options.draft);
             core.photo_here = kept.and_then(|light| light.take_up(&mut core.packed, photo));
             if core.photo_here.is_some() {
@@ -223,16 +224,12 @@ impl Renderer {
         cpu::pilot(&mut core.packed, core.lens_grid.as_ref(), &meter);
         core.is_planned = !meter.is_cancelled();
         without.apply_to_pixels(&mut core.packed.pixels);
-        let begun = core.places.end(Place::Pilot, begun);
+        core.places.end(Place::Pilot, begun);
         let photons = core.packed.photons_per_ray > 0;
         let note = core.packed.black_shadows(photons);
         core.notes
             .extend(note.filter(|note| !core.notes.contains(note)));
-        core.backdrop_share = match core.options.draft {
-            true => None,
-            false => cpu::backdrop_share(&mut core.packed),
-        };
-        let begun = core.places.end(Place::Backdrop, begun);
+        let begun = core.places.begin();
         let (width, height) = (core.packed.frame.width, core.packed.frame.height);
         let factors = core.packed.pixels.iter().map(|p| p.sample_factor);
         let fits = (core.film.width, core.film.height) == (width, height);
@@ -248,6 +245,7 @@ impl Renderer {
         let grouped = core.options.keeps_groups(core.scene.settings.combine);
         core.film.set_groups(grouped);
         core.film.set_photons(core.packed.photons_per_ray > 0);
+        core.film_is_new = true;
         core.places.end(Place::Film, begun);
         match (core.options.filter, core.options.draft) {
             (None, _) => {}

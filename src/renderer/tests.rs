@@ -172,6 +172,54 @@ fn bits(renderer: &Renderer) -> Vec<u32> {
     values.map(|value| value.to_bits()).collect()
 }
 
+/// What photons taught before is what they would teach again, or is forgotten. Control: a moved object, beside which they land elsewhere.
+#[test]
+fn photons_teach_once_what_an_edit_does_not_change() {
+    let nobody = Watcher::none();
+    let mut scene = scene_with_a_photo(false);
+    let glass = Material {
+        transmission: 1.0,
+        roughness: 0.0,
+        ..Material::default()
+    };
+    scene.objects[1].instances[0].material = Arc::new(glass);
+    scene.lights = vec![Light {
+        kind: LightKind::Quad {
+            corner: [-0.15, 1.0, -0.3],
+            edge_u: [0.3, 0.0, 0.0],
+            edge_v: [0.0, 0.0, 0.3],
+            radiance: [5.0; 3],
+        },
+        side: Side::Real,
+    }];
+    scene.settings.rays_per_pixel = 16;
+    let to = |x| glam::DMat4::from_translation(glam::DVec3::new(x, 0.01, 0.0));
+    let lens = crate::scene::Lens {
+        aperture_radius_m: 0.01,
+        ..scene.lens
+    };
+    let edits = |renderer: &mut Renderer, edit: usize| match edit {
+        0 => renderer.set_camera_pose(to(0.02), &nobody),
+        1 => renderer.set_lens(lens, &nobody),
+        2 => renderer.set_object_transform(1, to(0.05), &nobody),
+        _ => renderer.set_samples(1_000_000, 1, &nobody),
+    };
+    let new = || Renderer::new(scene.clone(), RendererOptions::default(), &nobody).expect("fits");
+    let [mut kept, mut forgetful] = [new(), new()];
+    for edit in 0..4 {
+        let before = kept.core.packed.guide.clone();
+        assert!(!before.is_empty());
+        edits(&mut kept, edit).expect("fits");
+        forgetful.core.packed.taught = None;
+        edits(&mut forgetful, edit).expect("fits");
+        let [kept, anew] = [&kept, &forgetful].map(|renderer| &renderer.core.packed);
+        assert_eq!(kept.guide, anew.guide, "{edit}");
+        assert_eq!(kept.pixels, anew.pixels, "{edit}");
+        assert_eq!(kept.photons_per_ray, anew.photons_per_ray, "{edit}");
+        assert_eq!(kept.guide == before, edit < 2, "{edit}");
+    }
+}
+
 /// On a device too, to which no more than its own records are sent. Control: before it was moved.
 #[test]
 fn a_moved_object_is_rendered_as_if_it_had_stood_there() {

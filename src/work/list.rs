@@ -55,9 +55,30 @@ pub struct WorkList {
     pub pass: Pass,
     /// Each pixel once at the most, in ascending order, none without samples.
     pub pixels: Vec<PixelWork>,
+    /// None of the pixels has any sample.
+    pub is_first: bool,
 }
 
 impl WorkList {
+    /// [`WorkList::main`] of a film that has no sample yet and the plan of `infos`: it is large, and not looked at.
+    pub fn first(
+        infos: &[PixelInfo],
+        film: &Film,
+        end_of_row: impl Fn(usize) -> u32 + Sync,
+    ) -> Self {
+        let first_ray = film.first_sample;
+        let samples = |pixel: usize, end: u32| {
+            let info = &infos[pixel];
+            let factor = info.sample_factor.max(1);
+            let wanted = info.flags & PIXEL_OUT_OF_REACH == 0;
+            wanted.then_some(first_ray * factor..end * factor)
+        };
+        Self {
+            is_first: true,
+            ..Self::of(Pass::Main, film, end_of_row, samples)
+        }
+    }
+
     /// The samples that every pixel within reach of something virtual still lacks. `end_of_row`: the index, in rays per pixel, before which those
     /// of a row are wanted.
     pub fn main(
@@ -68,7 +89,7 @@ impl WorkList {
         let wanted = |pixel: usize| infos[pixel].flags & PIXEL_OUT_OF_REACH == 0;
         Self::of(Pass::Main, film, end_of_row, |pixel, end| {
             let next = film.first_index(pixel) + film.pixels[pixel].n;
-            wanted(pixel).then_some(next..end)
+            wanted(pixel).then_some(next..film.end_index(pixel, end))
         })
     }
 
@@ -84,10 +105,12 @@ impl WorkList {
             let known_edge = infos[pixel].flags & PIXEL_EDGE != 0;
             let wanted = known_edge || film.needs_real(pixel) || (everywhere && sums.m < sums.n);
             let first = film.first_index(pixel);
+            let end = film.end_index(pixel, end);
             wanted.then_some(first + sums.n_real..end.min(first + sums.n))
         })
     }
 
+    /// `samples`: of a pixel, before so many rays per pixel.
     fn of(
         pass: Pass,
         film: &Film,
@@ -98,7 +121,7 @@ impl WorkList {
         let of_row = |row: usize| {
             let (samples, end) = (&samples, end_of_row(row));
             (row * width..(row + 1) * width).filter_map(move |pixel| {
-                let samples = samples(pixel, film.end_index(pixel, end))?;
+                let samples = samples(pixel, end)?;
                 (!samples.is_empty()).then(|| PixelWork::new(pixel as u32, samples))
             })
         };
@@ -106,6 +129,7 @@ impl WorkList {
         Self {
             pass,
             pixels: rows.flat_map_iter(of_row).collect(),
+            is_first: false,
         }
     }
 
@@ -122,6 +146,7 @@ impl WorkList {
         Self {
             pass: self.pass,
             pixels: self.pixels.iter().filter(is_left).copied().collect(),
+            is_first: self.is_first,
         }
     }
 
@@ -182,5 +207,22 @@ mod tests {
             list.pixels,
             [PixelWork::new(0, 1..4), PixelWork::new(1, 2..6)]
         );
+        let planned = [1, 2, 1].map(|sample_factor| PixelInfo {
+            sample_factor,
+            ..PixelInfo::uniform(0)
+        });
+        let first = WorkList::first(&planned, &film, |row| [4, 3, 1][row]);
+        assert!(first.is_first && !list.is_first);
+        assert_eq!(first.pixels, list.pixels);
+        film.add(
+            1,
+            &Sample {
+                is_virtual: false,
+                contribution: Vec3::ONE,
+                real: None,
+            },
+        );
+        let later = WorkList::main(&planned, &film, |row| [4, 3, 1][row]);
+        assert_ne!(first.pixels, later.pixels, "control: it has a sample");
     }
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::path::{Landing, PhotonNumber, first_landing};
 use crate::light::guide::{GUIDE_LOBES, guide_cell, guide_place};
-use crate::packed::PackedScene;
+use crate::packed::{PackedScene, Taught};
 
 /// Photons, as a share of the samples of the whole picture, and within these bounds.
 const PHOTONS_OF_SAMPLES: f64 = 1.0 / 64.0;
@@ -27,8 +27,31 @@ const LONE_WIDEST: f32 = 0.3;
 const WIDENING: f32 = 1.25;
 const MOST_CELLS: usize = 1 << 15;
 
-/// Fills the scene's guide. Its photons are those of the frame's seed.
+/// Fills the scene's guide. Its photons are those of the frame's seed. They are traced once as long as no more than the camera changes: where they
+/// land does not depend on it.
 pub fn learn(scene: &mut PackedScene) {
+    let samples = f64::from(scene.frame.rays_total) * scene.pixels.len() as f64;
+    let count = (samples * PHOTONS_OF_SAMPLES).clamp(f64::from(FEWEST), f64::from(MOST)) as u32;
+    let frame = &scene.frame;
+    let photons = [count, frame.seed, frame.flags, frame.max_bounces];
+    let known = (scene.taught.take()).filter(|known| known.photons == photons);
+    if let Some(known) = &known {
+        scene.guide.clone_from(&known.guide);
+        scene.frame.guide_cell_count = known.guide_cell_count;
+        scene.frame.guide_cells_per_m = known.guide_cells_per_m;
+    } else {
+        learn_from(scene, count);
+    }
+    let found = || Taught {
+        photons,
+        guide: scene.guide.clone(),
+        guide_cell_count: scene.frame.guide_cell_count,
+        guide_cells_per_m: scene.frame.guide_cells_per_m,
+    };
+    scene.taught = Some(known.unwrap_or_else(found));
+}
+
+fn learn_from(scene: &mut PackedScene, photons: u32) {
     let frame = &mut scene.frame;
     let spheres = &frame.photon_spheres[..frame.photon_sphere_count as usize];
     let radius = spheres.iter().map(|s| s[3]).sum::<f32>() / spheres.len().max(1) as f32;
@@ -36,8 +59,6 @@ pub fn learn(scene: &mut PackedScene) {
         return;
     }
     frame.guide_cells_per_m = 1.0 / (CELL_OF_RADIUS * radius);
-    let samples = f64::from(frame.rays_total) * scene.pixels.len() as f64;
-    let photons = (samples * PHOTONS_OF_SAMPLES).clamp(f64::from(FEWEST), f64::from(MOST)) as u32;
     let landings: Vec<Landing> = (0..photons)
         .into_par_iter()
         .filter_map(|place| {

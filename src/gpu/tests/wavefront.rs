@@ -149,6 +149,7 @@ pub(in crate::gpu) fn work_to(film: &Film, end: u32) -> WorkList {
     WorkList {
         pass: Pass::Main,
         pixels,
+        is_first: false,
     }
 }
 
@@ -156,6 +157,7 @@ fn real_work(pixels: Vec<PixelWork>) -> WorkList {
     WorkList {
         pass: Pass::Real,
         pixels,
+        is_first: false,
     }
 }
 
@@ -220,6 +222,36 @@ fn the_real_pass_fills_its_own_sums() {
     assert!(film.pixels[0].n_real == 4 && film.pixels[2].n_real == 5);
 }
 
+/// What photons left out of a film without samples stays counted where nothing of it goes to the device. Control: as if it did.
+#[test]
+fn a_first_list_keeps_what_photons_left_out() {
+    let Some(gpu) = test_device() else { return };
+    let mut start = Film::new(WIDTH, HEIGHT, 0, false);
+    start.pixels[6].non_finite = 2;
+    start.pixels[6].sample_factor = 1;
+    let rendered = |is_first| {
+        let work = WorkList {
+            is_first,
+            ..work_to(&start, 9)
+        };
+        let mut film = start.clone();
+        toy_backend(gpu, 7)
+            .render(
+                &mut film,
+                &work,
+                &mut RayCounts::default(),
+                &Watcher::none(),
+            )
+            .expect("renders");
+        film
+    };
+    let mut expected = start.clone();
+    toy_render(7, &mut expected, &work_to(&start, 9));
+    assert_eq!(rendered(true), expected);
+    assert_eq!(rendered(false), expected, "sent to the device");
+    assert_eq!(expected.pixels[6].non_finite, 2, "control");
+}
+
 /// A software device ends loops silently after 65,535 rounds of one invocation.
 #[test]
 fn one_pixel_takes_more_samples_than_a_loop_may_have_rounds() {
@@ -229,6 +261,7 @@ fn one_pixel_takes_more_samples_than_a_loop_may_have_rounds() {
     let work = WorkList {
         pass: Pass::Main,
         pixels: vec![PixelWork::new(11, 0..70_000)],
+        is_first: true,
     };
     toy_render(3, &mut expected, &work);
     let mut film = Film::new(WIDTH, HEIGHT, 0, false);

@@ -160,12 +160,12 @@ impl GpuBackend {
         self.parked.push(before);
         let state_parts = state_parts(&self.kernels);
         if state_parts != self.state_parts {
-            self.pacer = pacer(&self.gpu, &state_parts, self.beside_window);
+            self.pacer
+                .set_most_lanes(most_lanes(&self.gpu, &state_parts));
             self.state_parts = state_parts;
             self.lanes = None;
         }
         self.groups.clear();
-        self.courses = Default::default();
         self.warm = false;
         Ok(())
     }
@@ -273,6 +273,8 @@ impl GpuBackend {
         let mut job = Job {
             film,
             pass: work.pass,
+            is_first: work.is_first,
+            from_zero: false,
             rays,
             watcher,
             rays_of_parts: RayCounts::default(),

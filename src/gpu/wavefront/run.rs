@@ -27,6 +27,10 @@ const END_STEPS: f64 = 0.5;
 pub struct Job<'a> {
     pub film: &'a mut Film,
     pub pass: Pass,
+    /// As of its list.
+    pub is_first: bool,
+    /// The sums of the portion began at 0 on the device.
+    pub from_zero: bool,
     pub rays: &'a mut RayCounts,
     pub watcher: &'a Watcher<'a>,
     /// Rays of pixels that do not have all of their samples yet.
@@ -122,7 +126,10 @@ impl GpuBackend {
         slots.upload_work(&self.gpu, work);
         let begun = self.places.end(Place::List, begun);
         let mut before = self.gpu.device.create_command_encoder(&Default::default());
-        if (work.iter()).all(|work| job.film.is_untouched(work.pixel as usize)) {
+        let is_untouched = |work: &PixelWork| job.film.is_untouched(work.pixel as usize);
+        let from_zero = job.is_first || work.iter().all(is_untouched);
+        job.from_zero = from_zero;
+        if from_zero {
             slots.clear_sums(&mut before, work.len());
         } else {
             slots.upload_sums(&self.gpu, job.film, work);
@@ -174,7 +181,8 @@ impl GpuBackend {
         lanes: usize,
         beside: Beside,
     ) -> Vec<Planned> {
-        let most = match self.pacer.is_trying() {
+        // Of kernels that are new, the first batch alone: it says nothing about speed.
+        let most = match self.pacer.is_trying() || !self.warm {
             true => 1,
             false => MOST_BATCHES,
         };
@@ -254,6 +262,7 @@ impl GpuBackend {
         let home = Home {
             batches: to_run,
             slots: from.slot..after.slot,
+            from_zero: job.from_zero,
         };
         let mut records = Vec::new();
         let mut steps_in_vain = 0;

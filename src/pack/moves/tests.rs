@@ -126,3 +126,41 @@ fn an_object_that_does_not_fit_into_its_place_is_packed_with_all_others() {
     let position = packed.position(packed.real_vertex_count as u32);
     assert_ne!(position, Vec3::ZERO, "control: something is there");
 }
+
+/// Sum of the squared radii of the spheres about the virtual world.
+fn cross_section(packed: &PackedScene) -> f32 {
+    let spheres = &packed.frame.spheres[..packed.frame.sphere_count as usize];
+    spheres.iter().map(|sphere| sphere[3] * sphere[3]).sum()
+}
+
+/// Spheres go with an object that is moved as a whole, in a draft and beside; about one that is stretched they are found anew, and tighter.
+#[test]
+fn spheres_are_loose_about_stretched_objects_of_a_draft_alone() {
+    let mut scene = scene();
+    let [fine, draft] = [false, true].map(|is_draft| pack(&scene, is_draft));
+    assert_eq!(fine.frame.spheres, draft.frame.spheres);
+    let place = &mut scene.objects[2].world_from_object;
+    *place *= DMat4::from_scale(DVec3::new(0.1, 1.0, 10.0));
+    let mut moved = fine;
+    moved.move_object(&scene, 2).expect("packs");
+    let [fine, draft] = [false, true].map(|is_draft| pack(&scene, is_draft));
+    assert_eq!(bytes(&moved), bytes(&fine));
+    let [tight, loose] = [&fine, &draft].map(cross_section);
+    assert!(tight < 0.5 * loose, "{tight} {loose}");
+}
+
+/// Other materials have other smooth parts.
+#[test]
+fn an_object_of_another_material_gets_other_spheres() {
+    let mut scene = scene();
+    let mut packed = pack(&scene, false);
+    assert_eq!(packed.resting_smooth_covers.len(), 0);
+    let glass = Material {
+        transmission: 1.0,
+        roughness: 0.0,
+        ..Material::default()
+    };
+    scene.objects[0].instances[0].material = glass.into();
+    packed.move_virtual(&scene).expect("packs");
+    assert_eq!(packed.resting_smooth_covers.len(), 1);
+}

@@ -316,6 +316,7 @@ impl ToError<'_> {
             tiles_above_goal: over.iter().filter(|over| **over > 1.0).count(),
         };
         self.core.film = series.sum.into_film();
+        self.core.film_is_new = false;
         stated
     }
 }
