@@ -69,12 +69,6 @@ impl Pacer {
         }
     }
 
-    /// Other limits of the same device, for other kernels, where what is known of its speed is a beginning.
-    pub fn set_most_lanes(&mut self, most_lanes: usize) {
-        self.most_lanes = most_lanes.clamp(1, MOST_LANES);
-        self.lanes = self.lanes.min(self.most_lanes);
-    }
-
     /// Lanes that the next batch of so many samples may have: one step of all of them fills a submission.
     pub fn lanes_for(&mut self, samples: u64) -> usize {
         let of_all = usize::try_from(samples).unwrap_or(usize::MAX);
@@ -228,8 +222,6 @@ mod tests {
         assert!(fast.affords_far_more(LEAST_LANES, 100_000));
         assert!(!fast.affords_far_more(LEAST_LANES, 10_000), "few samples");
         assert!(!Pacer::new(LEAST_LANES, false).affords_far_more(LEAST_LANES, 100_000));
-        fast.set_most_lanes(50_000);
-        assert_eq!(fast.lanes_for(100_000), 50_000, "as fast, with less room");
     }
 
     #[test]

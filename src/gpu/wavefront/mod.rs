@@ -160,12 +160,12 @@ impl GpuBackend {
         self.parked.push(before);
         let state_parts = state_parts(&self.kernels);
         if state_parts != self.state_parts {
-            self.pacer
-                .set_most_lanes(most_lanes(&self.gpu, &state_parts));
+            self.pacer = pacer(&self.gpu, &state_parts, self.beside_window);
             self.state_parts = state_parts;
             self.lanes = None;
         }
         self.groups.clear();
+        self.courses = Default::default();
         self.warm = false;
         Ok(())
     }

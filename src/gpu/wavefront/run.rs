@@ -181,8 +181,7 @@ impl GpuBackend {
         lanes: usize,
         beside: Beside,
     ) -> Vec<Planned> {
-        // Of kernels that are new, the first batch alone: it says nothing about speed.
-        let most = match self.pacer.is_trying() || !self.warm {
+        let most = match self.pacer.is_trying() {
             true => 1,
             false => MOST_BATCHES,
         };
