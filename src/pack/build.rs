@@ -69,8 +69,7 @@ impl PackedScene {
         Self::build_into(Self::empty(), scene, anchor, watcher)
     }
 
-    /// [`PackedScene::build_at`] with looser spheres about virtual objects that are stretched, and trees that are refitted however far their objects
-    /// come: [`PackedScene::move_virtual`] then costs little.
+    /// [`PackedScene::build_at`] with looser spheres about the virtual objects, each with its own: [`PackedScene::move_virtual`] then costs little.
     ///
     /// # Errors
     /// As [`PackedScene::build`].
@@ -80,7 +79,7 @@ impl PackedScene {
         watcher: &Watcher<'_>,
     ) -> Result<Self, PackError> {
         let draft = Self {
-            is_draft: true,
+            object_covers: Some(Vec::new()),
             ..Self::empty()
         };
         Self::build_into(draft, scene, anchor, watcher)

@@ -15,7 +15,8 @@ impl PackedScene {
         self.place_virtual(scene)?;
         let first = self.frame.real_triangle_count;
         let corners = self.corners(first as usize);
-        if !self.virtual_bvh.refit(&corners)? || (!self.is_draft && self.virtual_bvh.is_worn()) {
+        let is_draft = self.object_covers.is_some();
+        if !self.virtual_bvh.refit(&corners)? || (!is_draft && self.virtual_bvh.is_worn()) {
             self.virtual_bvh = WorldBvh::build(&corners, first)?;
         }
         self.rebuild_moving(scene)
@@ -34,7 +35,8 @@ impl PackedScene {
         let corners = self.corners_of(moved.triangles.clone());
         self.virtual_bvh
             .refit_part(moved.triangles.start - first, &corners)?;
-        let is_worn = !self.is_draft && self.virtual_bvh.is_worn();
+        let is_draft = self.object_covers.is_some();
+        let is_worn = !is_draft && self.virtual_bvh.is_worn();
         if is_worn {
             let resting = self.corners_of(first..self.resting.triangles);
             self.virtual_bvh = WorldBvh::build(&resting, first as u32)?;

@@ -14,8 +14,6 @@ pub use records::*;
 
 use std::ops::Range;
 
-use glam::DMat4;
-
 use crate::accel::{Cover, WorldBvh};
 pub use crate::shared::NONE;
 
@@ -73,10 +71,8 @@ pub struct PackedScene {
     pub(crate) resting_covers: Vec<Cover>,
     /// Over those of them that are smooth.
     pub(crate) resting_smooth_covers: Vec<Cover>,
-    /// Those of the virtual objects that were found so far, each once.
-    pub(crate) object_covers: Vec<ObjectCover>,
-    /// Spheres may be loose, and trees worn.
-    pub(crate) is_draft: bool,
+    /// Of a draft: the virtual objects' that were found so far.
+    pub(crate) object_covers: Option<Vec<ObjectCover>>,
     pub(crate) env_mean_luminance: f64,
     pub(crate) env_traced: TracedEnvironment,
     /// Half-angle at which the lights that send photons show at smooth objects, radians: a mean by their shares, of each at its largest.
@@ -105,16 +101,12 @@ pub(crate) struct Taught {
     pub guide_cells_per_m: f32,
 }
 
-/// Spheres about a virtual object.
+/// Spheres about a virtual object, in its own space.
 pub(crate) struct ObjectCover {
     /// Index in the scene.
     pub object: usize,
     /// Of its triangles that rest.
     pub triangles: usize,
-    /// To the space that they were found in.
-    pub space_from_object: DMat4,
-    /// Of its parts that rest.
-    pub materials: Vec<Material>,
     pub whole: Cover,
     /// About what of it is smooth.
     pub smooth: Cover,
@@ -170,8 +162,7 @@ impl PackedScene {
             moved: None,
             resting_covers: Vec::new(),
             resting_smooth_covers: Vec::new(),
-            object_covers: Vec::new(),
-            is_draft: false,
+            object_covers: None,
             env_mean_luminance: 0.0,
             env_traced: TracedEnvironment::default(),
             photon_light_radius: 0.0,
