@@ -90,6 +90,9 @@ pub fn enlarged(film: &Film, width: u32, height: u32, mode: Composite) -> Film {
 
 /// The same in place of what `whole` held, which has the size.
 pub fn enlarge(film: &Film, mode: Composite, whole: &mut Film) {
+    // What photons brought is in the sums.
+    whole.set_photons(false);
+    whole.set_groups(false);
     let (width, height) = (whole.width, whole.height);
     let small_width = film.width as usize;
     let pixels = (0..film.pixels.len()).into_par_iter();
@@ -108,7 +111,7 @@ pub fn enlarge(film: &Film, mode: Composite, whole: &mut Film) {
             let parts = taps_x.map(|x| &mixed[x]);
             if parts.iter().any(|part| part.is_touched) {
                 *sums = Layer::mixed(parts, weights_x).sums();
-            } else if sums.n > 0 {
+            } else if (sums.n, sums.sample_factor, sums.non_finite) != (0, 0, 0) {
                 *sums = PixelSums::default();
             }
         }

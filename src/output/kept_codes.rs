@@ -13,7 +13,7 @@ use crate::scene::srgb::decode8;
 /// The mean change around, codes, below which ...
 const KEPT_MEAN_CODES: f64 = 0.85;
 /// ... the photograph's code stays if the pixel's own change is less than this, which is rounded to one code at most.
-const KEPT_CODES: f64 = 1.4;
+const KEPT_CHANGE_CODES: f64 = 1.4;
 /// Larger changes are no part of the mean: there something virtual begins.
 const AVERAGED_CODES: f64 = 2.5;
 /// The mean is that of the pixels so far away in every direction.
@@ -22,7 +22,7 @@ const REACH_PX: usize = 4;
 /// Changes are held in shares of a code: sums of integers are the same in any order.
 const PARTS: f64 = 256.0;
 const KEPT_MEAN: i32 = (KEPT_MEAN_CODES * PARTS) as i32;
-const KEPT: i32 = (KEPT_CODES * PARTS) as i32;
+const KEPT: i32 = (KEPT_CHANGE_CODES * PARTS) as i32;
 const AVERAGED: i32 = (AVERAGED_CODES * PARTS) as i32;
 
 /// A column of the window: sums of the changes, and how many they are.

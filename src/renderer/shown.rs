@@ -106,14 +106,6 @@ impl Renderer {
         }
     }
 
-    /// Its picture alone, which spares a copy of the film.
-    pub fn delivered_picture(&self) -> Picture {
-        match self.core.options.filter {
-            Some(Filter::Preview) => self.picture(),
-            Some(Filter::Final) | None => self.delivered().picture,
-        }
-    }
-
     /// Evaluations of a pixel's difference, by group.
     fn group_counts(&self, pixel: usize) -> [u32; GROUPS as usize] {
         let Core { film, packed, .. } = &self.core;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::film::{Sample, composite};
+use crate::film::{Sample, Splat, composite};
 use crate::scene::Photo;
 
 const COARSE: [u32; 2] = [6, 4];
@@ -28,6 +28,31 @@ fn film() -> Film {
         }
     }
     film
+}
+
+/// Nothing of what a film held is left, photons and groups neither. Control: they were there.
+#[test]
+fn a_film_that_is_used_again_is_a_new_one() {
+    let mut whole = Film::new(WHOLE[0], WHOLE[1], 0, false);
+    whole.set_photons(true);
+    whole.set_groups(true);
+    whole.set_sample_factors((0..WHOLE[0] * WHOLE[1]).map(|_| 2));
+    let sample = Sample {
+        is_virtual: false,
+        contribution: Vec3::ONE,
+        real: None,
+    };
+    (0..whole.pixels.len()).for_each(|pixel| whole.add(pixel, &sample));
+    let splat = Splat {
+        pixel: 3,
+        is_virtual: false,
+        value: Vec3::ONE,
+    };
+    whole.add_splats(4, [splat].into_iter());
+    let new = enlarged(&film(), WHOLE[0], WHOLE[1], Composite::Additive);
+    assert!(whole != new && whole.photons() == 4, "control");
+    enlarge(&film(), Composite::Additive, &mut whole);
+    assert!(whole == new);
 }
 
 /// Value less the photograph, of the sixth row.
