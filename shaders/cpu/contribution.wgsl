@@ -2,11 +2,12 @@
 
 import package::gpu::buffers::{frame, pixels};
 import package::camera::sampler::{SampleKey, SampleSet, sample_set};
-import package::packed::records::{FRAME_BACKDROP, FRAME_NO_PHOTONS, SIDE_VIRTUAL};
+import package::packed::records::{FRAME_BACKDROP, FRAME_NO_PHOTONS, PIXEL_BEAM_MAY_MEET_VIRTUAL, SAMPLER_CMJ, SAMPLER_JITTERED, SIDE_VIRTUAL};
 import package::material::bsdf::{bsdf_is_diffuse, bsdf_is_glossy, bsdf_is_polished};
 import package::material::surface::Surface;
+import package::cpu::sharing::{MEMBERS, member_of, tile_of};
 import package::cpu::state::{
-    DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_FROM_LENS, EVENT_REAL_CHAIN, EVENT_SCATTERED, EVENT_SEEN, EVENT_VIRTUAL_CHAIN, MODE_MIXED, MODE_REAL, MODE_SHARED, PathState, path_radiances_real, path_results,
+    DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_FROM_LENS, EVENT_REAL_CHAIN, EVENT_SCATTERED, EVENT_SEEN, EVENT_VIRTUAL_CHAIN, FIRST_DIFFERENCE, FIRST_NONE, MODE_MIXED, MODE_REAL, MODE_SHARED, POINT_NONE, PathState, path_firsts, path_radiances_real, path_results,
 };
 
 fn draw(st: ptr<function, PathState>, purpose: u32) -> SampleSet {
@@ -16,6 +17,12 @@ fn draw(st: ptr<function, PathState>, purpose: u32) -> SampleSet {
 fn draw_one_of(st: ptr<function, PathState>, purpose: u32, number: u32, count: u32) -> SampleSet {
     let set_id = FIRST_DEPTH_SET + (*st).ray.depth * SETS_PER_DEPTH + purpose;
     var key = sample_key(st);
+    @if(sharing) {
+        if is_for_tile(st, purpose) {
+            key.index = index_in_tile(st, key);
+            key.pixel = tile_of(frame.width, key.pixel) | TILE_NUMBERS;
+        }
+    }
     key.index = key.index * count + number;
     key.total *= count;
     return sample_set(key, set_id);
@@ -23,6 +30,30 @@ fn draw_one_of(st: ptr<function, PathState>, purpose: u32, number: u32, count: u
 
 fn sample_key(st: ptr<function, PathState>) -> SampleKey {
     return SampleKey((*st).path.pixel, (*st).path.index, frame.rays_total * pixels[(*st).path.pixel].sample_factor, frame.seed, frame.sampler);
+}
+
+fn is_for_tile(st: ptr<function, PathState>, purpose: u32) -> bool {
+    let lane = (*st).lane;
+    let is_shared_direction = (*st).ray.depth == 1u
+        && path_firsts[lane].kept != FIRST_NONE
+        && purpose != SET_DIFFERENCE_LIGHT
+        && purpose != SET_PATH_LIGHT;
+    return (is_shared_direction || path_firsts[lane].capture != POINT_NONE)
+        && frame.sampler != SAMPLER_JITTERED
+        && frame.sampler != SAMPLER_CMJ;
+}
+
+fn index_in_tile(st: ptr<function, PathState>, key: SampleKey) -> u32 {
+    let info = pixels[key.pixel];
+    var index = key.index;
+    var count = key.total;
+    if path_firsts[(*st).lane].kept == FIRST_DIFFERENCE {
+        count /= info.difference_period;
+        if (info.flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u { index /= info.difference_period; }
+    }
+    let run = 1u << firstLeadingBit(max(count, 1u));
+    let runs_before = index / run * MEMBERS + member_of(frame.width, key.pixel);
+    return runs_before * run + index % run;
 }
 
 fn accumulate(st: ptr<function, PathState>, unclamped: vec3<f32>) {

@@ -28,15 +28,10 @@ fn tile_of(width: u32, pixel: u32) -> u32 {
 }
 
 fn member_of(width: u32, pixel: u32) -> u32 {
-    let x = pixel % width;
-    let y = pixel / width;
-    return y % BLOCK_SIDE / TILE_STRIDE * TILE_SIDE + x % BLOCK_SIDE / TILE_STRIDE;
-}
-
-fn quarter_of(member: u32) -> u32 {
-    let column = member % TILE_SIDE;
-    let row = member / TILE_SIDE;
-    return row / QUARTER_SIDE * 2u + column / QUARTER_SIDE;
+    let column = pixel % width % BLOCK_SIDE / TILE_STRIDE;
+    let row = pixel / width % BLOCK_SIDE / TILE_STRIDE;
+    let quarter = row / QUARTER_SIDE * 2u + column / QUARTER_SIDE;
+    return quarter * QUARTER + row % QUARTER_SIDE * QUARTER_SIDE + column % QUARTER_SIDE;
 }
 
 fn link_to(first: FirstVertex, point: SharedPoint, kind: u32) -> Link {
@@ -83,10 +78,8 @@ fn first_link(kind: u32) -> u32 {
 
 fn link_of(kind: u32, source: u32, receiver: u32) -> u32 {
     if kind == POINT_RECURSION { return receiver; }
-    if quarter_of(source) != quarter_of(receiver) { return LINKS; }
-    let column = receiver % TILE_SIDE;
-    let row = receiver / TILE_SIDE;
-    return first_link(kind) + row % QUARTER_SIDE * QUARTER_SIDE + column % QUARTER_SIDE;
+    if source / QUARTER != receiver / QUARTER { return LINKS; }
+    return first_link(kind) + receiver % QUARTER;
 }
 
 // Number of a lane's pixel in its tile.

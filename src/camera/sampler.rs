@@ -40,9 +40,9 @@ shared! {
     /// What a sample's values depend on, besides the set.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
     pub value struct SampleKey {
-        /// Row-major pixel index.
+        /// Row-major pixel index, or what stands for several pixels that draw from one sequence.
         pub pixel: u32,
-        /// Sample of the pixel, 0..total.
+        /// Sample of the pixel, 0..total, or its place in the sequence.
         pub index: u32,
         /// Rays per pixel that `jittered` and `cmj` are laid out for, 1..=[`MAX_TOTAL`].
         pub total: u32,

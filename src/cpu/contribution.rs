@@ -2,11 +2,13 @@
 
 use glam::Vec3;
 
+use super::sharing::{MEMBERS, member_of, tile_of};
 use super::state::*;
 use crate::camera::sampler::{SampleKey, SampleSet, sample_set};
 use crate::material::{Surface, bsdf_is_diffuse, bsdf_is_glossy, bsdf_is_polished};
 use crate::packed::{
-    ESTIMATOR_PAPER, FRAME_BACKDROP, FRAME_NO_PHOTONS, Frame, PackedScene, SIDE_VIRTUAL,
+    ESTIMATOR_PAPER, FRAME_BACKDROP, FRAME_NO_PHOTONS, Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL,
+    PackedScene, SAMPLER_CMJ, SAMPLER_JITTERED, SIDE_VIRTUAL,
 };
 use crate::shared::shared;
 
@@ -20,6 +22,9 @@ shared! {
     pub const SET_PATH_BSDF: u32 = 4;
     const SETS_PER_DEPTH: u32 = 5;
     const FIRST_DEPTH_SET: u32 = 2;
+
+    /// Sets the numbers of a tile apart from those of its pixels.
+    const TILE_NUMBERS: u32 = 0x8000_0000;
 }
 
 /// Random numbers of one decision at the present vertex, computed when asked for. The samplers spread the first pair of a set best: it is what
@@ -40,6 +45,10 @@ pub fn draw_one_of(
 ) -> SampleSet {
     let set_id = FIRST_DEPTH_SET + st.ray.depth * SETS_PER_DEPTH + purpose;
     let mut key = sample_key(scene, st);
+    if is_for_tile(scene, st, purpose) {
+        key.index = index_in_tile(scene, st, key);
+        key.pixel = tile_of(scene.frame.width, key.pixel) | TILE_NUMBERS;
+    }
     key.index = key.index * count + number;
     key.total *= count;
     sample_set(key, set_id)
@@ -53,6 +62,35 @@ pub fn sample_key(scene: &PackedScene, st: &PathState) -> SampleKey {
         seed: scene.frame.seed,
         sampler: scene.frame.sampler,
     }
+}
+
+/// Whether what the decision finds may go to the other samples of a sharing tile. The lights of the first vertex stay its own, and the grids of
+/// other samplers are laid out for one pixel.
+fn is_for_tile(scene: &PackedScene, st: &PathState, purpose: u32) -> bool {
+    let is_shared_direction = st.ray.depth == 1
+        && st.first.kept != FIRST_NONE
+        && purpose != SET_DIFFERENCE_LIGHT
+        && purpose != SET_PATH_LIGHT;
+    (is_shared_direction || st.first.capture != POINT_NONE)
+        && scene.frame.sampler != SAMPLER_JITTERED
+        && scene.frame.sampler != SAMPLER_CMJ
+}
+
+/// Place of a sample in the sequence of its tile: those of one pixel follow one another in runs, as long as the largest power of two that a pixel's
+/// samples fill, so that they are spread by themselves as well as together with those of the other pixels.
+fn index_in_tile(scene: &PackedScene, st: &PathState, key: SampleKey) -> u32 {
+    let info = &scene.pixels[key.pixel as usize];
+    let (mut index, mut count) = (key.index, key.total);
+    if st.first.kept == FIRST_DIFFERENCE {
+        count /= info.difference_period;
+        // Where no beam meets virtual geometry samples are numbered by their turns.
+        if info.flags & PIXEL_BEAM_MAY_MEET_VIRTUAL != 0 {
+            index /= info.difference_period;
+        }
+    }
+    let run = 1 << count.max(1).ilog2();
+    let runs_before = index / run * MEMBERS + member_of(scene.frame.width, key.pixel);
+    runs_before * run + index % run
 }
 
 /// Adds light to what the present mode accumulates into.
@@ -154,5 +192,48 @@ pub fn density_weight(density: f32, pdf: f32) -> f32 {
     } else {
         let ratio = pdf / density;
         1.0 / (1.0 + ratio * ratio)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::cpu::render::test_scene;
+    use crate::cpu::sharing::{BLOCK_SIDE, TILE_STRIDE};
+
+    #[test]
+    fn the_samples_of_a_tile_have_places_of_their_own_and_those_of_a_pixel_whole_runs() {
+        let mut scene = test_scene();
+        let (pixels_of_a_side, width) = (BLOCK_SIDE / TILE_STRIDE, scene.frame.width);
+        let near = PIXEL_BEAM_MAY_MEET_VIRTUAL;
+        // Rays, flags, period, first vertex, the first two samples, and the places that one pixel's fill.
+        let cases = [
+            (32, near, 1, FIRST_VIRTUAL, [0, 1], 32),
+            (49, near, 3, FIRST_DIFFERENCE, [2, 5], 16),
+            (49, 0, 3, FIRST_DIFFERENCE, [0, 1], 16),
+        ];
+        for (rays, flags, difference_period, kept, [first, second], run) in cases {
+            scene.frame.rays_total = rays;
+            let mut places = BTreeSet::new();
+            for at in 0..MEMBERS {
+                let (column, row) = (at % pixels_of_a_side, at / pixels_of_a_side);
+                let pixel = row * TILE_STRIDE * width + column * TILE_STRIDE;
+                let member = member_of(width, pixel);
+                scene.pixels[pixel as usize].flags = flags;
+                scene.pixels[pixel as usize].difference_period = difference_period;
+                let place = |number: u32| {
+                    let mut st = path_state(pixel, first + number * (second - first));
+                    st.first.kept = kept;
+                    index_in_tile(&scene, &st, sample_key(&scene, &st))
+                };
+                let of_pixel: BTreeSet<_> = (0..run).map(place).collect();
+                assert!(of_pixel.iter().all(|place| place / run == member));
+                assert!(place(run) / run >= MEMBERS, "the next run");
+                places.extend(of_pixel);
+            }
+            assert!(places.iter().copied().eq(0..MEMBERS * run));
+        }
     }
 }

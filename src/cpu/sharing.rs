@@ -38,6 +38,7 @@ shared! {
     pub const MEMBERS: u32 = TILE_SIDE * TILE_SIDE;
     /// Points found by the cones are dear to share, and are shared within quarters of a tile.
     const QUARTER_SIDE: u32 = TILE_SIDE / 2;
+    /// Members of a quarter, whose numbers follow one another.
     const QUARTER: u32 = QUARTER_SIDE * QUARTER_SIDE;
     /// Links of a sample's points to the members that may use them.
     pub const LINKS: u32 = MEMBERS + 2 * QUARTER;
@@ -64,16 +65,12 @@ pub fn tile_of(width: u32, pixel: u32) -> u32 {
     (block * TILE_STRIDE + y % TILE_STRIDE) * TILE_STRIDE + x % TILE_STRIDE
 }
 
-/// Number of a pixel among the members of its tile: row by row.
+/// Number of a pixel among the members of its tile: quarter by quarter, and row by row in each.
 pub fn member_of(width: u32, pixel: u32) -> u32 {
-    let (x, y) = (pixel % width, pixel / width);
-    y % BLOCK_SIDE / TILE_STRIDE * TILE_SIDE + x % BLOCK_SIDE / TILE_STRIDE
-}
-
-/// Number of a member's quarter of its tile.
-fn quarter_of(member: u32) -> u32 {
-    let (column, row) = (member % TILE_SIDE, member / TILE_SIDE);
-    row / QUARTER_SIDE * 2 + column / QUARTER_SIDE
+    let column = pixel % width % BLOCK_SIDE / TILE_STRIDE;
+    let row = pixel / width % BLOCK_SIDE / TILE_STRIDE;
+    let quarter = row / QUARTER_SIDE * 2 + column / QUARTER_SIDE;
+    quarter * QUARTER + row % QUARTER_SIDE * QUARTER_SIDE + column % QUARTER_SIDE
 }
 
 /// Of the points of one sample to the members of its tile, by [`link_of`].
@@ -155,11 +152,10 @@ fn link_of(kind: u32, from: u32, to: u32) -> u32 {
     if kind == POINT_RECURSION {
         return to;
     }
-    if quarter_of(from) != quarter_of(to) {
+    if from / QUARTER != to / QUARTER {
         return LINKS;
     }
-    let (column, row) = (to % TILE_SIDE, to / TILE_SIDE);
-    first_link(kind) + row % QUARTER_SIDE * QUARTER_SIDE + column % QUARTER_SIDE
+    first_link(kind) + to % QUARTER
 }
 
 /// Largest channel of what leaves a point; 0 where there is nothing to share.
@@ -279,6 +275,8 @@ mod tests {
             (tiles.len(), tiles.last().copied()),
             (4, Some(&(4 * (6 + 2) + 3)))
         );
+        let members: BTreeSet<_> = in_block.map(|pixel| member_of(width, pixel)).collect();
+        assert!(members.into_iter().eq(0..MEMBERS));
         let neighbours = [
             tile_of(width, 8 * width + 16),
             tile_of(width, 8 * width + 17),
