@@ -5,7 +5,7 @@ import package::camera::sampler::{SampleKey, SampleSet, sample_set};
 import package::packed::records::{FRAME_BACKDROP, FRAME_NO_PHOTONS, PIXEL_BEAM_MAY_MEET_VIRTUAL, SAMPLER_CMJ, SAMPLER_JITTERED, SIDE_VIRTUAL};
 import package::material::bsdf::{bsdf_is_diffuse, bsdf_is_glossy, bsdf_is_polished};
 import package::material::surface::Surface;
-import package::cpu::sharing::{MEMBERS, member_of, tile_of};
+import package::cpu::sharing_tile::{MEMBERS, member_of, tile_of};
 import package::cpu::state::{
     DELTA_DENSITY, EVENT_AT_POLISHED, EVENT_FROM_LENS, EVENT_REAL_CHAIN, EVENT_SCATTERED, EVENT_SEEN, EVENT_VIRTUAL_CHAIN, FIRST_DIFFERENCE, FIRST_NONE, MODE_MIXED, MODE_REAL, MODE_SHARED, POINT_NONE, PathState, path_firsts, path_radiances_real, path_results,
 };

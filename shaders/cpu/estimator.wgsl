@@ -25,7 +25,7 @@ import package::material::surface::{Surface, surface_at};
 import package::accel::trace::Hit;
 import package::cpu::panes::{is_pane, open_share, open_share_real};
 import package::cpu::points::{end_capture, end_cone_capture};
-import package::cpu::sharing::tile_of;
+import package::cpu::sharing_tile::tile_of;
 import package::cpu::vertex::shade_vertex;
 
 fn difference_turn(pixel: u32, index: u32) -> u32 {

@@ -11,6 +11,7 @@ import package::material::scatter::{lambert_cos, terminator};
 import package::math::{INV_PI, dot3, length3, safe_sqrt};
 import package::cpu::panes::blocks;
 import package::cpu::request::answer;
+import package::cpu::sharing_tile::{MEMBERS, QUARTER, member_of};
 import package::camera::sampler::sample_set;
 import package::cpu::contribution::{LINK_SET, sample_key};
 import package::cpu::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS, plays};
@@ -18,21 +19,6 @@ import package::cpu::state::{
     FIRST_NONE, FIRST_VIRTUAL, FirstVertex, POINTS, POINT_COVERED, POINT_RECURSION, PathRay, PathState, REQUEST_SHADOW_DIFFERENCE, REQUEST_SHADOW_MIXED,
     SharedPoint, path_firsts, path_links, path_points, paths,
 };
-
-fn tile_of(width: u32, pixel: u32) -> u32 {
-    let x = pixel % width;
-    let y = pixel / width;
-    let blocks = (width + BLOCK_SIDE - 1u) / BLOCK_SIDE;
-    let block = y / BLOCK_SIDE * blocks + x / BLOCK_SIDE;
-    return (block * TILE_STRIDE + y % TILE_STRIDE) * TILE_STRIDE + x % TILE_STRIDE;
-}
-
-fn member_of(width: u32, pixel: u32) -> u32 {
-    let column = pixel % width % BLOCK_SIDE / TILE_STRIDE;
-    let row = pixel / width % BLOCK_SIDE / TILE_STRIDE;
-    let quarter = row / QUARTER_SIDE * 2u + column / QUARTER_SIDE;
-    return quarter * QUARTER + row % QUARTER_SIDE * QUARTER_SIDE + column % QUARTER_SIDE;
-}
 
 fn link_to(first: FirstVertex, point: SharedPoint, kind: u32) -> Link {
     let to_point = point.position - first.origin.position;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::sharing::{MEMBERS, member_of, tile_of};
+use super::sharing_tile::{MEMBERS, member_of, tile_of};
 use super::state::*;
 use crate::camera::sampler::{SampleKey, SampleSet, sample_set};
 use crate::material::{Surface, bsdf_is_diffuse, bsdf_is_glossy, bsdf_is_polished};
@@ -201,7 +201,7 @@ mod tests {
 
     use super::*;
     use crate::cpu::render::test_scene;
-    use crate::cpu::sharing::{BLOCK_SIDE, TILE_STRIDE};
+    use crate::cpu::sharing_tile::{BLOCK_SIDE, TILE_STRIDE};
 
     #[test]
     fn the_samples_of_a_tile_have_places_of_their_own_and_those_of_a_pixel_whole_runs() {

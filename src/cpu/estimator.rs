@@ -9,7 +9,7 @@ use glam::Vec3;
 use super::contribution::*;
 use super::panes::{is_pane, open_share, open_share_real};
 use super::points::{end_capture, end_cone_capture};
-use super::sharing::tile_of;
+use super::sharing_tile::tile_of;
 use super::state::*;
 use super::vertex::shade_vertex;
 use crate::accel::Hit;

@@ -13,6 +13,7 @@ pub mod points;
 pub mod render;
 pub mod request;
 pub mod sharing;
+pub mod sharing_tile;
 pub mod state;
 mod surfaces;
 mod tiles;

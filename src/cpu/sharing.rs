@@ -18,6 +18,7 @@ use super::contribution::{LINK_SET, sample_key};
 use super::in_flight::{InFlight, Member};
 use super::panes::blocks;
 use super::request::answer;
+use super::sharing_tile::{MEMBERS, QUARTER};
 use super::state::*;
 use super::vertex::{SHADOW_SHORTEN, SHADOW_SHORTEN_ERRORS, plays};
 use crate::camera::sampler::sample_set;
@@ -29,17 +30,6 @@ use crate::packed::{Frame, NONE, PackedScene, SIDE_REAL, SIDE_VIRTUAL};
 use crate::shared::shared;
 
 shared! {
-    /// Pixels of a tile in either direction, and from one to the next.
-    const TILE_SIDE: u32 = 4;
-    pub const TILE_STRIDE: u32 = 2;
-    /// Pixels along a block's side, which hold the tiles.
-    pub const BLOCK_SIDE: u32 = TILE_SIDE * TILE_STRIDE;
-    /// Members of a tile.
-    pub const MEMBERS: u32 = TILE_SIDE * TILE_SIDE;
-    /// Points found by the cones are dear to share, and are shared within quarters of a tile.
-    const QUARTER_SIDE: u32 = TILE_SIDE / 2;
-    /// Members of a quarter, whose numbers follow one another.
-    const QUARTER: u32 = QUARTER_SIDE * QUARTER_SIDE;
     /// Links of a sample's points to the members that may use them.
     pub const LINKS: u32 = MEMBERS + 2 * QUARTER;
     /// Points nearer than this, squared metres, count as this far: weights stay finite.
@@ -55,22 +45,6 @@ shared! {
         /// With which the vertex's technique draws the point, 1 / square metre.
         density: f32,
     }
-}
-
-/// Number of a pixel's tile.
-pub fn tile_of(width: u32, pixel: u32) -> u32 {
-    let (x, y) = (pixel % width, pixel / width);
-    let blocks = width.div_ceil(BLOCK_SIDE);
-    let block = y / BLOCK_SIDE * blocks + x / BLOCK_SIDE;
-    (block * TILE_STRIDE + y % TILE_STRIDE) * TILE_STRIDE + x % TILE_STRIDE
-}
-
-/// Number of a pixel among the members of its tile: quarter by quarter, and row by row in each.
-pub fn member_of(width: u32, pixel: u32) -> u32 {
-    let column = pixel % width % BLOCK_SIDE / TILE_STRIDE;
-    let row = pixel / width % BLOCK_SIDE / TILE_STRIDE;
-    let quarter = row / QUARTER_SIDE * 2 + column / QUARTER_SIDE;
-    quarter * QUARTER + row % QUARTER_SIDE * QUARTER_SIDE + column % QUARTER_SIDE
 }
 
 /// Of the points of one sample to the members of its tile, by [`link_of`].
@@ -258,6 +232,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
+    use crate::cpu::sharing_tile::{member_of, tile_of};
     use crate::cpu::state::path_state;
     use crate::pack::test_scene;
     use crate::packed::PackedScene;

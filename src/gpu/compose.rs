@@ -201,6 +201,7 @@ pub(super) const DECLARED: &[&Module] = &[
     &cpu::photons::path::SHARED,
     &cpu::request::SHARED,
     &cpu::sharing::SHARED,
+    &cpu::sharing_tile::SHARED,
     &cpu::state::SHARED,
     &cpu::vertex::SHARED,
 ];

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 
 use super::lanes::Batch;
-use crate::cpu::sharing::{BLOCK_SIDE, TILE_STRIDE, tile_of};
+use crate::cpu::sharing_tile::{BLOCK_SIDE, TILE_STRIDE, tile_of};
 use crate::work::PixelWork;
 use crate::work::list::TILE_PLACES;
 

@@ -106,7 +106,7 @@ side = "virtual"
     let camera = "[camera]\nwidth = 32\nheight = 24\nvertical_fov_deg = 0.2\nposition = [0, 20, 140]\nlook_at = [0, 0.4, 0]\n";
     let seen = |lamp: &str| {
         let mut scene = scene(&format!("{camera}{lamp}{BOX}"));
-        scene.settings.rays_per_pixel = 100;
+        scene.settings.rays_per_pixel = 1600;
         scene.settings.max_bounces = 1;
         let renderer = render(&scene, backend);
         let picture = renderer.picture();

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::blocks::Blocks;
 use crate::cpu::batch::Batch;
-use crate::cpu::sharing::{BLOCK_SIDE, TILE_STRIDE, tile_of};
+use crate::cpu::sharing_tile::{BLOCK_SIDE, TILE_STRIDE, tile_of};
 use crate::cpu::state::{FIRST_NONE, PathState};
 use crate::film::is_unusable;
 use crate::math::{hash_combine, hash_u32};

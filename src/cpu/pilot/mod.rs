@@ -29,7 +29,7 @@ pub(super) use patch::{Certainty, each_patch, in_world};
 use reach::WorldSpheres;
 pub(super) use reach::real_sphere;
 
-use crate::cpu::sharing::BLOCK_SIDE;
+use crate::cpu::sharing_tile::BLOCK_SIDE;
 use crate::packed::{
     ESTIMATOR_PAPER, FRAME_ALPHA, FRAME_AOVS, FRAME_BOTH_SHADOWS, FRAME_NO_GUIDE, FRAME_NO_SHARING,
     Frame, PIXEL_BEAM_MAY_MEET_VIRTUAL, PIXEL_OUT_OF_REACH, PIXEL_SHARES, PIXEL_SHARES_NEAR,
