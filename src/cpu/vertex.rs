@@ -49,6 +49,8 @@ shared! {
     /// and shadow rays cost little beside the rest of a sample.
     const CONTACT_LIGHTS: u32 = 4;
     const CONTACT_REACH: f32 = 0.25;
+    /// And at the first vertex of a path on a virtual surface with blurred lobes: highlights are bright, and which lights were drawn is their noise.
+    const GLOSSY_LIGHTS: u32 = 8;
 
     /// A density below it is none.
     const MIN_POSITIVE: f32 = f32::MIN_POSITIVE;
@@ -221,6 +223,17 @@ fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface) {
     accumulate(scene, st, light);
 }
 
+/// Lights drawn at a path's vertex.
+fn path_lights(scene: &PackedScene, st: &PathState, s: &Surface) -> u32 {
+    let seen_first = st.path.mode == MODE_MIXED && st.ray.depth == 1;
+    let blurred = !bsdf_is_lambertian(s) && !bsdf_is_polished(s);
+    if scene.frame.estimator != ESTIMATOR_PAPER && seen_first && blurred {
+        GLOSSY_LIGHTS
+    } else {
+        1
+    }
+}
+
 /// Draws the vertex's lights up to the next that asks for a shadow ray. Those that are left stay pending: the vertex is shaded again after it.
 fn draw_lights(
     scene: &PackedScene,
@@ -229,7 +242,7 @@ fn draw_lights(
     wo: Vec3,
     techniques: Option<&Techniques>,
 ) {
-    let count = techniques.map_or(1, |t| t.lights);
+    let count = techniques.map_or_else(|| path_lights(scene, st, s), |t| t.lights);
     let mut left = st.path.pending / PENDING_LIGHT;
     st.path.pending %= PENDING_LIGHT;
     if left == 0 {
@@ -336,14 +349,16 @@ fn light_contribution(
     }
     let mut weight = 1.0;
     if !l.delta && !lights_suffice(scene, st, s) {
+        let mut drawn = l.pdf * path_lights(scene, st, s) as f32;
         let mut other = path_pdf(scene, st, s, l.direction, f.pdf);
         if let Some(t) = techniques {
+            drawn = l.pdf;
             other = t.cone_probability * cone_pdf(&t.cones, l.direction);
             if !left_to_cones(scene, s) {
                 other += f.pdf;
             }
         }
-        weight = density_weight(l.pdf, other);
+        weight = density_weight(drawn, other);
     }
     let sign = if difference && real_light { -1.0 } else { 1.0 };
     st.path.throughput * f.f_cos * l.radiance * (sign * weight / l.pdf)
@@ -568,6 +583,10 @@ fn plan_continuation(
             return;
         }
         segment.throughput *= 1.0 / survival;
+    }
+    if !b.delta {
+        // Beside each of the lights that were drawn there.
+        segment.density *= 1.0 / path_lights(scene, st, s) as f32;
     }
     st.path.pending |= PENDING_NEXT;
     st.path.events = events | st.path.events & EVENT_LIGHT_LEFT_TO_PATH;
