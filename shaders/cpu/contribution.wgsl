@@ -18,10 +18,10 @@ fn draw_one_of(st: ptr<function, PathState>, purpose: u32, number: u32, count: u
     let set_id = FIRST_DEPTH_SET + (*st).ray.depth * SETS_PER_DEPTH + purpose;
     var key = sample_key(st);
     @if(sharing) {
-        if is_for_tile(st, purpose) {
-            key.index = index_in_tile(st, key);
-            key.pixel = tile_of(frame.width, key.pixel) | TILE_NUMBERS;
-        }
+        // Chosen rather than branched on, here and below: a branch keeps a mask of lanes in scarce scalar registers.
+        let for_tile = is_for_tile(st, purpose);
+        key.index = select(key.index, index_in_tile(st, key), for_tile);
+        key.pixel = select(key.pixel, tile_of(frame.width, key.pixel) | TILE_NUMBERS, for_tile);
     }
     key.index = key.index * count + number;
     key.total *= count;
@@ -34,26 +34,21 @@ fn sample_key(st: ptr<function, PathState>) -> SampleKey {
 
 fn is_for_tile(st: ptr<function, PathState>, purpose: u32) -> bool {
     let lane = (*st).lane;
-    let is_shared_direction = (*st).ray.depth == 1u
-        && path_firsts[lane].kept != FIRST_NONE
-        && purpose != SET_DIFFERENCE_LIGHT
-        && purpose != SET_PATH_LIGHT;
-    return (is_shared_direction || path_firsts[lane].capture != POINT_NONE)
-        && frame.sampler != SAMPLER_JITTERED
-        && frame.sampler != SAMPLER_CMJ;
+    let of_lights = purpose == SET_DIFFERENCE_LIGHT || purpose == SET_PATH_LIGHT;
+    let is_shared_direction = ((*st).ray.depth == 1u) & (path_firsts[lane].kept != FIRST_NONE) & !of_lights;
+    let is_laid_out = (frame.sampler == SAMPLER_JITTERED) | (frame.sampler == SAMPLER_CMJ);
+    return (is_shared_direction | (path_firsts[lane].capture != POINT_NONE)) & !is_laid_out;
 }
 
 fn index_in_tile(st: ptr<function, PathState>, key: SampleKey) -> u32 {
     let info = pixels[key.pixel];
-    var index = key.index;
-    var count = key.total;
-    if path_firsts[(*st).lane].kept == FIRST_DIFFERENCE {
-        count /= info.difference_period;
-        if (info.flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u { index /= info.difference_period; }
-    }
-    let run = 1u << firstLeadingBit(max(count, 1u));
-    let runs_before = index / run * MEMBERS + member_of(frame.width, key.pixel);
-    return runs_before * run + index % run;
+    let is_difference = path_firsts[(*st).lane].kept == FIRST_DIFFERENCE;
+    let by_turns = is_difference & ((info.flags & PIXEL_BEAM_MAY_MEET_VIRTUAL) != 0u);
+    let count = key.total / select(1u, info.difference_period, is_difference);
+    let index = key.index / select(1u, info.difference_period, by_turns);
+    let run_bits = firstLeadingBit(max(count, 1u));
+    let runs_before = (index >> run_bits) * MEMBERS + member_of(frame.width, key.pixel);
+    return (runs_before << run_bits) + (index & ((1u << run_bits) - 1u));
 }
 
 fn accumulate(st: ptr<function, PathState>, unclamped: vec3<f32>) {

@@ -85,7 +85,7 @@ fn shade_vertex(st: ptr<function, PathState>, s: Surface) {
         if difference && is_smooth(s, (*st).ray.side, (*st).ray.depth == 1u) { (*st).path.events |= EVENT_AT_POLISHED; }
     }
     // Those of a path are played for certain.
-    var techniques = Techniques(0.0, 1.0, 1u);
+    var techniques = Techniques(0.0, 1.0, path_lights(st, s));
     @if(!paper) {
         if difference {
             techniques = techniques_at(st, s, wo);
@@ -179,7 +179,7 @@ fn path_lights(st: ptr<function, PathState>, s: Surface) -> u32 {
 }
 
 fn draw_lights(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, techniques: Techniques) {
-    let count = select(path_lights(st, s), techniques.lights, is_difference(st));
+    let count = techniques.lights;
     var left = (*st).path.pending / PENDING_LIGHT;
     (*st).path.pending %= PENDING_LIGHT;
     if left == 0u { left = count; }
@@ -240,18 +240,16 @@ fn light_contribution(
     if max_element(f.f_cos) <= 0.0 { return vec3<f32>(0.0); }
     var weight = 1.0;
     if !l.delta && !lights_suffice(st, s) {
-        var drawn = l.pdf * f32(path_lights(st, s));
         var other = f.pdf;
         @if(guide) { other = path_pdf(st, s, l.direction, f.pdf); }
         @if(!paper) {
             if difference {
-                drawn = l.pdf;
                 other = 0.0;
                 if techniques.cone_probability > 0.0 { other = techniques.cone_probability * cone_pdf(cones_at(s.position, s.ns), l.direction); }
                 if !left_to_cones(s) { other += f.pdf; }
             }
         }
-        weight = density_weight(drawn, other);
+        weight = density_weight(l.pdf, other);
     }
     let sign = select(1.0, -1.0, difference && real_light);
     return (*st).path.throughput * f.f_cos * l.radiance * (sign * weight / l.pdf);
@@ -413,7 +411,6 @@ fn plan_continuation(st: ptr<function, PathState>, s: Surface, wo: vec3<f32>, te
             segment.throughput *= 1.0 / survival;
         }
     }
-    if !b.delta { segment.density *= 1.0 / f32(path_lights(st, s)); }
     (*st).path.pending |= PENDING_NEXT;
     @if(panes) { events |= (*st).path.events & EVENT_LIGHT_LEFT_TO_PATH; }
     (*st).path.events = events;

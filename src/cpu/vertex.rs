@@ -349,16 +349,14 @@ fn light_contribution(
     }
     let mut weight = 1.0;
     if !l.delta && !lights_suffice(scene, st, s) {
-        let mut drawn = l.pdf * path_lights(scene, st, s) as f32;
         let mut other = path_pdf(scene, st, s, l.direction, f.pdf);
         if let Some(t) = techniques {
-            drawn = l.pdf;
             other = t.cone_probability * cone_pdf(&t.cones, l.direction);
             if !left_to_cones(scene, s) {
                 other += f.pdf;
             }
         }
-        weight = density_weight(drawn, other);
+        weight = density_weight(l.pdf, other);
     }
     let sign = if difference && real_light { -1.0 } else { 1.0 };
     st.path.throughput * f.f_cos * l.radiance * (sign * weight / l.pdf)
@@ -583,10 +581,6 @@ fn plan_continuation(
             return;
         }
         segment.throughput *= 1.0 / survival;
-    }
-    if !b.delta {
-        // Beside each of the lights that were drawn there.
-        segment.density *= 1.0 / path_lights(scene, st, s) as f32;
     }
     st.path.pending |= PENDING_NEXT;
     st.path.events = events | st.path.events & EVENT_LIGHT_LEFT_TO_PATH;
