@@ -7,7 +7,7 @@ import package::packed::records::{
 };
 import package::shared::NONE;
 import package::material::scatter::BsdfSample;
-import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample, bsdf_straight};
+import package::material::bsdf::{bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_diffuse, bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample, bsdf_straight};
 import package::camera::sampler::{SampleSet, fourth, pair, second_pair, third};
 import package::light::backdrop::backdrop_radiance;
 import package::light::cones::{cone_pdf, cone_sample, cone_solid_angle_fraction, cones_at, direction_meets_spheres};
@@ -174,7 +174,7 @@ fn path_lights(st: ptr<function, PathState>, s: Surface) -> u32 {
     }
     @else {
         let seen_first = (*st).path.mode == MODE_MIXED && (*st).ray.depth == 1u;
-        return select(1u, GLOSSY_LIGHTS, seen_first && !bsdf_is_lambertian(s) && !bsdf_is_polished(s));
+        return select(1u, GLOSSY_LIGHTS, seen_first && !bsdf_is_diffuse(s) && !bsdf_is_polished(s));
     }
 }
 

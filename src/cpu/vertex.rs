@@ -19,8 +19,8 @@ use crate::light::environment::share_left_to_eye;
 use crate::light::guide::{GUIDE_SHARE, guide_cell, guide_count, guide_pdf, guide_sample};
 use crate::light::lights::{LightSample, light_pdf_hit, light_sample, light_select};
 use crate::material::{
-    BsdfSample, Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_lambertian,
-    bsdf_is_polished, bsdf_passes_straight, bsdf_sample, bsdf_straight,
+    BsdfSample, Surface, bsdf_albedo, bsdf_eval, bsdf_is_delta, bsdf_is_diffuse,
+    bsdf_is_lambertian, bsdf_is_polished, bsdf_passes_straight, bsdf_sample, bsdf_straight,
 };
 use crate::math::{dot3, safe_sqrt};
 use crate::packed::{
@@ -49,7 +49,7 @@ shared! {
     /// and shadow rays cost little beside the rest of a sample.
     const CONTACT_LIGHTS: u32 = 4;
     const CONTACT_REACH: f32 = 0.25;
-    /// And at the first vertex of a path on a virtual surface with blurred lobes: highlights are bright, and which lights were drawn is their noise.
+    /// And where the camera first meets a virtual surface of blurred lobes alone: highlights are bright, and which lights were drawn is their noise.
     const GLOSSY_LIGHTS: u32 = 8;
 
     /// A density below it is none.
@@ -226,7 +226,7 @@ fn add_emission(scene: &PackedScene, st: &mut PathState, s: &Surface) {
 /// Lights drawn at a path's vertex.
 fn path_lights(scene: &PackedScene, st: &PathState, s: &Surface) -> u32 {
     let seen_first = st.path.mode == MODE_MIXED && st.ray.depth == 1;
-    let blurred = !bsdf_is_lambertian(s) && !bsdf_is_polished(s);
+    let blurred = !bsdf_is_diffuse(s) && !bsdf_is_polished(s);
     if scene.frame.estimator != ESTIMATOR_PAPER && seen_first && blurred {
         GLOSSY_LIGHTS
     } else {
