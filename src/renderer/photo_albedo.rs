@@ -29,12 +29,14 @@ struct GridSpec {
 const MAX_ALBEDO: f32 = 0.98;
 /// Albedo of the first round.
 const FIRST_ALBEDO: f32 = 0.5;
-/// Grid of the irradiance estimate.
+/// Grid of the exposure's fit.
 const GRID: GridSpec = GridSpec {
     pitch_px: 4,
     rays: 32,
 };
-const ROUNDS: usize = 2;
+/// Grids of the irradiance estimate, round by round. The first only tells what light the surfaces send to each other. A deep shadow is a small
+/// difference of large numbers, in which an error of 1% of the last one's light shows as 10 of 255 codes.
+const ROUNDS: [GridSpec; 2] = [GridSpec { rays: 8, ..GRID }, GridSpec { rays: 128, ..GRID }];
 /// Least grid pitch of an exposure that is only told, its grid points at the most, and its rays per grid point.
 const ROUGH_PITCH_PX: usize = 24;
 const ROUGH_POINTS: usize = 200;
@@ -90,11 +92,11 @@ pub fn estimate_photo_albedo(
         seen,
         light: Vec::new(),
     };
-    let points = grid_points(scene, GRID.pitch_px);
-    let meter = Meter::begin(watcher, Phase::Albedo, ROUNDS as u64 * points);
+    let rays = ROUNDS.iter().map(|round| grid_rays(scene, round)).sum();
+    let meter = Meter::begin(watcher, Phase::Albedo, rays);
     let mut limited = 0;
-    for _ in 0..ROUNDS {
-        estimate.light = light_on_surfaces(scene, &estimate.seen, &meter);
+    for round in ROUNDS {
+        estimate.light = light_on_surfaces(scene, &estimate.seen, round, &meter);
         limited = estimate.set_albedo(scene, photo);
     }
     meter.end();
@@ -177,8 +179,8 @@ pub fn roughly_limited_share(scene: &mut PackedScene, photo: &Photo) -> f64 {
     let from_photo = |flags| flags & MATERIAL_PHOTO_ALBEDO != 0;
     let seen = first_surfaces(scene, grid.pitch_px, from_photo);
     scene.photo_albedo = unknown_albedo(scene, &seen);
-    let points = grid_points(scene, grid.pitch_px);
-    let meter = Meter::begin(&Watcher::none(), Phase::Albedo, points);
+    let rays = grid_rays(scene, &grid);
+    let meter = Meter::begin(&Watcher::none(), Phase::Albedo, rays);
     let grid = trace_grid(scene, &seen, grid, &meter);
     meter.end();
     let (width, scale) = (scene.frame.width as usize, scene.frame.exposure_scale);
@@ -222,8 +224,7 @@ fn fit_exposure_on(
     watcher: &Watcher<'_>,
 ) -> Option<f64> {
     scene.photo_albedo = unknown_albedo(scene, seen);
-    let points = grid_points(scene, grid.pitch_px);
-    let meter = Meter::begin(watcher, Phase::Exposure, points);
+    let meter = Meter::begin(watcher, Phase::Exposure, grid_rays(scene, &grid));
     let grid = trace_grid(scene, seen, grid, &meter);
     meter.end();
     let width = scene.frame.width as usize;
@@ -317,9 +318,9 @@ fn grid_size(scene: &PackedScene, pitch_px: usize) -> (usize, usize) {
     (points(scene.frame.width), points(scene.frame.height))
 }
 
-fn grid_points(scene: &PackedScene, pitch_px: usize) -> u64 {
-    let (width, height) = grid_size(scene, pitch_px);
-    width as u64 * height as u64
+fn grid_rays(scene: &PackedScene, spec: &GridSpec) -> u64 {
+    let (width, height) = grid_size(scene, spec.pitch_px);
+    width as u64 * height as u64 * u64::from(spec.rays)
 }
 
 /// Path traces the real world on the grid, with a pinhole.
@@ -338,7 +339,7 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen], spec: GridSpec, meter: &Me
     let points = (0..width * height)
         .into_par_iter()
         .map(|i| {
-            meter.add(1);
+            meter.add(u64::from(rays));
             let x = ((i % width) * pitch_px + pitch_px / 2).min(frame_width - 1);
             let y = ((i / width) * pitch_px + pitch_px / 2).min(frame_height - 1);
             let pixel = y * frame_width + x;
@@ -369,8 +370,13 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen], spec: GridSpec, meter: &Me
 }
 
 /// E / pi of every pixel with a wanted surface: the grid's estimates, weighted by distance, depth and normal.
-fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) -> Vec<Vec3> {
-    let grid = trace_grid(scene, seen, GRID, meter);
+fn light_on_surfaces(
+    scene: &mut PackedScene,
+    seen: &[Seen],
+    spec: GridSpec,
+    meter: &Meter<'_>,
+) -> Vec<Vec3> {
+    let grid = trace_grid(scene, seen, spec, meter);
     let width = scene.frame.width as usize;
     seen.par_iter()
         .enumerate()
@@ -379,7 +385,7 @@ fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) 
                 return Vec3::ZERO;
             }
             let (x, y) = (pixel % width, pixel / width);
-            let (gx, gy) = ((x / GRID.pitch_px) as isize, (y / GRID.pitch_px) as isize);
+            let (gx, gy) = ((x / spec.pitch_px) as isize, (y / spec.pitch_px) as isize);
             let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
             for dy in -FILTER_RADIUS..=FILTER_RADIUS {
                 for dx in -FILTER_RADIUS..=FILTER_RADIUS {
@@ -393,7 +399,7 @@ fn light_on_surfaces(scene: &mut PackedScene, seen: &[Seen], meter: &Meter<'_>) 
                     let there = &seen[point.y * width + point.x];
                     let away =
                         (point.x as f32 - x as f32).powi(2) + (point.y as f32 - y as f32).powi(2);
-                    let pitch = GRID.pitch_px as f32;
+                    let pitch = spec.pitch_px as f32;
                     let depth_step = (there.depth_m - s.depth_m)
                         / (s.depth_m * DEPTH_TOLERANCE * (1.0 + away.sqrt() / pitch));
                     let weight = (-away / (2.0 * pitch * pitch)).exp()

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
 use super::path::{Landing, PhotonNumber, first_landing};
@@ -10,11 +10,11 @@ use crate::light::guide::{GUIDE_LOBES, guide_cell, guide_place};
 use crate::packed::{PackedScene, Taught};
 
 /// Photons, as a share of the samples of the whole picture, and within these bounds.
-const PHOTONS_OF_SAMPLES: f64 = 1.0 / 64.0;
+const PHOTONS_OF_SAMPLES: f64 = 1.0 / 16.0;
 const FEWEST: u32 = 1 << 12;
-const MOST: u32 = 1 << 16;
+const MOST: u32 = 1 << 18;
 /// Side of the narrowest cells in mean radii of the spheres that photons are sent to.
-const CELL_OF_RADIUS: f32 = 0.25;
+const CELL_OF_RADIUS: f32 = 0.5;
 /// Landings of a cell that are looked at.
 const LANDINGS: usize = 128;
 /// Half-angles of lobes, radians: the narrowest and the widest.
@@ -26,6 +26,10 @@ const LONE_WIDEST: f32 = 0.3;
 /// A lobe reaches this much further than the landings that it was made for.
 const WIDENING: f32 = 1.25;
 const MOST_CELLS: usize = 1 << 15;
+/// How often targets and what belongs to them are found from each other.
+const REFINEMENTS: usize = 2;
+/// Keeps a target by the surface where nearly parallel rays leave its distance open.
+const FIRMNESS: f32 = 1e-4;
 
 /// Fills the scene's guide. Its photons are those of the frame's seed. They are traced once as long as no more than the camera changes: where they
 /// land does not depend on it.
@@ -101,47 +105,103 @@ fn learn_from(scene: &mut PackedScene, photons: u32) {
     }
 }
 
-/// Points and 1 - cos of half-angles so that each landing's direction lies in the lobe of the nearest point: greedy k-centres (Gonzalez 1985).
+/// Targets of a cell's lobes, and 1 - cos of their half-angles, so that each landing's direction lies in a lobe: the landing that is farthest from the
+/// lobes so far gets one of its own (greedy k-centres, Gonzalez 1985), until they are narrow, and each aims at where its landings' rays meet.
 /// `light_radius`: half-angle at which lights show, radians.
 fn lobes(landings: &[Landing], light_radius: f32) -> Vec<[f32; 4]> {
-    let directions: Vec<Vec3> = landings
-        .iter()
-        .map(|landing| (landing.from - landing.position).normalize_or_zero())
-        .collect();
-    let angle = |a: Vec3, b: Vec3| 2.0 * (0.5 * a.distance(b)).min(1.0).asin();
-    let mut centres = vec![0];
-    let mut nearest: Vec<(usize, f32)> = (directions.iter())
-        .map(|&d| (0, angle(d, directions[0])))
-        .collect();
-    while centres.len() < GUIDE_LOBES as usize {
-        let (farthest, &(_, apart)) = (nearest.iter().enumerate())
-            .max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1))
-            .expect("a cell has landings");
-        if apart <= NARROWEST {
-            break;
+    let mut targets = vec![target_of(landings.iter())];
+    let (mut nearest, mut farthest) = nearest_targets(landings, &targets);
+    while targets.len() < GUIDE_LOBES as usize && nearest[farthest].1 > NARROWEST {
+        targets.push(landings[farthest].from);
+        for _ in 0..REFINEMENTS {
+            (nearest, _) = nearest_targets(landings, &targets);
+            targets = (0..targets.len())
+                .map(|target| members(landings, &nearest, target))
+                .filter(|members| members.clone().next().is_some())
+                .map(target_of)
+                .collect();
         }
-        for (own, &d) in nearest.iter_mut().zip(&directions) {
-            let apart = angle(d, directions[farthest]);
-            if apart < own.1 {
-                *own = (centres.len(), apart);
-            }
-        }
-        centres.push(farthest);
+        (nearest, farthest) = nearest_targets(landings, &targets);
     }
-    let half_angle = |centre: usize| {
-        let members = nearest.iter().filter(|(of, _)| *of == centre);
-        let (count, reach) = members.fold((0.0, 0.0_f32), |(count, reach), (_, apart)| {
+    let half_angle = |target: usize| {
+        let apart = nearest.iter().filter(|(of, _)| *of == target);
+        let (count, reach) = apart.fold((0.0, 0.0_f32), |(count, reach), (_, apart)| {
             (count + 1.0, reach.max(*apart))
         });
         // The fewer landings, the less is known.
-        let unknown = (LONE_OF_LIGHT * light_radius).min(LONE_WIDEST) / f32::sqrt(count);
+        let unknown = (LONE_OF_LIGHT * light_radius).min(LONE_WIDEST) / f32::max(count, 1.0).sqrt();
         (WIDENING * reach).max(unknown).clamp(NARROWEST, WIDEST)
     };
-    (centres.iter().enumerate())
-        .map(|(centre, &landing)| {
-            let [x, y, z] = landings[landing].from.to_array();
-            let half = 0.5 * half_angle(centre);
-            [x, y, z, 2.0 * half.sin() * half.sin()]
+    (targets.iter().enumerate())
+        .map(|(number, target)| {
+            let half = 0.5 * half_angle(number);
+            target.extend(2.0 * half.sin() * half.sin()).to_array()
         })
         .collect()
+}
+
+/// The nearest target of each landing and how far its direction is from it, radians; the landing that is farthest.
+fn nearest_targets(landings: &[Landing], targets: &[Vec3]) -> (Vec<(usize, f32)>, usize) {
+    let nearest: Vec<(usize, f32)> = (landings.iter())
+        .map(|landing| {
+            (targets.iter().enumerate())
+                .map(|(number, target)| (number, angle_from(landing, *target)))
+                .min_by(|(_, a), (_, b)| a.total_cmp(b))
+                .expect("there is a target")
+        })
+        .collect();
+    let farthest = (nearest.iter().enumerate())
+        .max_by(|(_, (_, a)), (_, (_, b))| a.total_cmp(b))
+        .map_or(0, |(number, _)| number);
+    (nearest, farthest)
+}
+
+fn members<'a>(
+    landings: &'a [Landing],
+    nearest: &'a [(usize, f32)],
+    target: usize,
+) -> impl Iterator<Item = &'a Landing> + Clone {
+    let of_target = move |(_, (nearest, _)): &(&Landing, &(usize, f32))| *nearest == target;
+    landings
+        .iter()
+        .zip(nearest)
+        .filter(of_target)
+        .map(|(landing, _)| landing)
+}
+
+fn direction(landing: &Landing) -> Vec3 {
+    (landing.from - landing.position).normalize_or_zero()
+}
+
+fn angle_from(landing: &Landing, target: Vec3) -> f32 {
+    let to = (target - landing.position).normalize_or_zero();
+    2.0 * (0.5 * direction(landing).distance(to)).min(1.0).asin()
+}
+
+/// Where the rays of landings come from: the point that is nearest to all of them, such as the image of the sun behind a curved mirror, or the mean of
+/// the points of smooth surfaces that they came by, whichever they point at better.
+fn target_of<'a>(landings: impl Iterator<Item = &'a Landing> + Clone) -> Vec3 {
+    let count = landings.clone().count() as f32;
+    let mean = landings.clone().map(|landing| landing.from).sum::<Vec3>() / count;
+    // Relative to the mean, so that small differences keep their digits.
+    let (mut across, mut offset) = (
+        Mat3::from_diagonal(Vec3::splat(FIRMNESS * count)),
+        Vec3::ZERO,
+    );
+    for landing in landings.clone() {
+        let d = direction(landing);
+        let projection = Mat3::IDENTITY - Mat3::from_cols(d * d.x, d * d.y, d * d.z);
+        across += projection;
+        offset += projection * (landing.position - mean);
+    }
+    let meeting = mean + across.inverse() * offset;
+    let error = |target: Vec3| -> f32 {
+        let angles = landings.clone().map(|landing| angle_from(landing, target));
+        angles.map(|angle| angle * angle).sum()
+    };
+    if error(meeting) < error(mean) {
+        meeting
+    } else {
+        mean
+    }
 }
