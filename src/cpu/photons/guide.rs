@@ -9,8 +9,11 @@ use super::path::{Landing, PhotonNumber, first_landing};
 use crate::light::guide::{GUIDE_LOBES, guide_cell, guide_place};
 use crate::packed::{PackedScene, Taught};
 
-/// Photons, as a share of the samples of the whole picture, and within these bounds.
-const PHOTONS_OF_SAMPLES: f64 = 1.0 / 16.0;
+/// Photons, as a share of the samples of the whole picture, and within these bounds. That share where few rays a pixel are to come soon, and up to
+/// `MOST_MORE` times as much where there are more than `MANY_RAYS`.
+const PHOTONS_OF_SAMPLES: f64 = 1.0 / 64.0;
+const MANY_RAYS: f64 = 8.0;
+const MOST_MORE: f64 = 4.0;
 const FEWEST: u32 = 1 << 12;
 const MOST: u32 = 1 << 18;
 /// Side of the narrowest cells in mean radii of the spheres that photons are sent to.
@@ -34,8 +37,10 @@ const FIRMNESS: f32 = 1e-4;
 /// Fills the scene's guide. Its photons are those of the frame's seed. They are traced once as long as no more than the camera changes: where they
 /// land does not depend on it.
 pub fn learn(scene: &mut PackedScene) {
-    let samples = f64::from(scene.frame.rays_total) * scene.pixels.len() as f64;
-    let count = (samples * PHOTONS_OF_SAMPLES).clamp(f64::from(FEWEST), f64::from(MOST)) as u32;
+    let rays = f64::from(scene.frame.rays_total);
+    let share = PHOTONS_OF_SAMPLES * (rays / MANY_RAYS).clamp(1.0, MOST_MORE);
+    let samples = rays * scene.pixels.len() as f64;
+    let count = (samples * share).clamp(f64::from(FEWEST), f64::from(MOST)) as u32;
     let frame = &scene.frame;
     let photons = [count, frame.seed, frame.flags, frame.max_bounces];
     let known = (scene.taught.take()).filter(|known| known.photons == photons);
@@ -111,7 +116,11 @@ fn learn_from(scene: &mut PackedScene, photons: u32) {
 fn lobes(landings: &[Landing], light_radius: f32) -> Vec<[f32; 4]> {
     let mut targets = vec![target_of(landings.iter())];
     let (mut nearest, mut farthest) = nearest_targets(landings, &targets);
-    while targets.len() < GUIDE_LOBES as usize && nearest[farthest].1 > NARROWEST {
+    // A new target may take the place of another, so that their number need not grow.
+    for _ in 1..GUIDE_LOBES {
+        if nearest[farthest].1 <= NARROWEST {
+            break;
+        }
         targets.push(landings[farthest].from);
         for _ in 0..REFINEMENTS {
             (nearest, _) = nearest_targets(landings, &targets);
@@ -205,3 +214,6 @@ fn target_of<'a>(landings: impl Iterator<Item = &'a Landing> + Clone) -> Vec3 {
         mean
     }
 }
+
+#[cfg(test)]
+mod tests;
