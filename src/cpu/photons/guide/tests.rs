@@ -53,16 +53,16 @@ fn two_images_get_a_lobe_each() {
     }
 }
 
-/// Light that comes from everywhere: targets lose their landings to each other, and yet there is an end.
+/// Light that comes from everywhere: targets lose their landings to each other (by a count of targets, cell 171 would never end), and yet there is an end.
 #[test]
 fn scattered_light_comes_to_an_end() {
     let number = |i: u32| crate::math::uniform_from_bits(crate::math::hash_u32(i)) - 0.5;
-    for scene in 0..200 {
+    for cell in 0..200 {
         let vector = |i: u32| Vec3::new(number(i), number(i + 1), number(i + 2));
-        let seen: Vec<Landing> = (0..128)
+        let seen: Vec<Landing> = (0..10)
             .map(|i| Landing {
-                position: 0.3 * vector(1000 * scene + 6 * i),
-                from: vector(1000 * scene + 6 * i + 3),
+                position: vector(1000 * cell + 6 * i),
+                from: vector(1000 * cell + 6 * i + 3),
             })
             .collect();
         let found = lobes(&seen, 0.1);
