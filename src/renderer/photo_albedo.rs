@@ -1,8 +1,8 @@
 //! Albedo of the proxy estimated from the photograph, and the exposure that fits the proxy's light to it.
 //!
 //! A Lambertian point of albedo A under irradiance E shows A E / pi. E changes slowly, so it is estimated on a coarse grid with path tracing
-//! through the real world, spread to all pixels by a filter that respects depth and normal, and A = Ic / (E / pi). Light between real surfaces
-//! depends on A, so this is repeated.
+//! through the real world, smoothed and spread to all pixels (`smoothing`), and A = Ic / (E / pi). Light between real surfaces depends on A, so
+//! this is repeated.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -16,6 +16,10 @@ use crate::packed::{
 };
 use crate::scene::Photo;
 use crate::work::{Meter, Phase, Watcher};
+use smoothing::light_on_surfaces;
+
+mod smoothing;
+mod unoccluded;
 
 /// How many rays are traced where.
 #[derive(Clone, Copy)]
@@ -41,10 +45,10 @@ const ROUNDS: [GridSpec; 2] = [GridSpec { rays: 8, ..GRID }, GridSpec { rays: 12
 const ROUGH_PITCH_PX: usize = 24;
 const ROUGH_POINTS: usize = 200;
 const ROUGH_RAYS: u32 = 8;
-/// Half-width of the spreading filter in grid points; relative depth and normal tolerances.
-const FILTER_RADIUS: isize = 3;
+/// Relative difference in depth up to which the camera sees the point itself.
 const DEPTH_TOLERANCE: f32 = 0.02;
-const NORMAL_POWER: i32 = 16;
+/// Of a grid point's rays, whose differences tell how sure its light is.
+const GROUPS: usize = 4;
 
 /// One pixel's first real surface along its pinhole ray.
 #[derive(Clone, Copy)]
@@ -96,7 +100,8 @@ pub fn estimate_photo_albedo(
     let meter = Meter::begin(watcher, Phase::Albedo, rays);
     let mut limited = 0;
     for round in ROUNDS {
-        estimate.light = light_on_surfaces(scene, &estimate.seen, round, &meter);
+        let grid = trace_grid(scene, &estimate.seen, round, &meter);
+        estimate.light = light_on_surfaces(scene, &estimate.seen, &grid, round.pitch_px);
         limited = estimate.set_albedo(scene, photo);
     }
     meter.end();
@@ -305,12 +310,39 @@ struct GridPoint {
     radiance: Vec3,
     /// Radiance per unit of albedo: E / pi.
     light: Vec3,
+    /// The same from each group of the rays.
+    groups: [Vec3; GROUPS],
 }
 
 struct Grid {
     width: usize,
     height: usize,
     points: Vec<Option<GridPoint>>,
+}
+
+impl Grid {
+    /// Places of the grid up to `reach` to either side of one.
+    fn around(&self, x: usize, y: usize, reach: usize) -> impl Iterator<Item = usize> + use<> {
+        let (width, height) = (self.width, self.height);
+        let range =
+            move |at: usize, end: usize| at.saturating_sub(reach)..(at + reach + 1).min(end);
+        range(y, height).flat_map(move |row| range(x, width).map(move |x| row * width + x))
+    }
+
+    /// Places at the same offset, up to `reach` to either side, from two of them.
+    fn pairs(&self, a: usize, b: usize, reach: isize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let place = |at: usize, dx: isize, dy: isize| {
+            let (x, y) = (
+                (at % self.width) as isize + dx,
+                (at / self.width) as isize + dy,
+            );
+            let inside = x >= 0 && y >= 0 && x < self.width as isize && y < self.height as isize;
+            inside.then(|| y as usize * self.width + x as usize)
+        };
+        (-reach..=reach).flat_map(move |dy| {
+            (-reach..=reach).filter_map(move |dx| Some((place(a, dx, dy)?, place(b, dx, dy)?)))
+        })
+    }
 }
 
 fn grid_size(scene: &PackedScene, pitch_px: usize) -> (usize, usize) {
@@ -346,18 +378,24 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen], spec: GridSpec, meter: &Me
             if seen[pixel].depth_m <= 0.0 {
                 return None;
             }
-            let (mut radiance, mut albedo) = (Vec3::ZERO, Vec3::ZERO);
+            let mut sums = [(Vec3::ZERO, Vec3::ZERO); GROUPS];
             for index in 0..rays {
                 let (ir, a) = render_first_hit(shared, pixel as u32, index);
-                radiance += ir;
-                albedo += a;
+                let (radiance, albedo) = &mut sums[index as usize * GROUPS / rays as usize];
+                *radiance += ir;
+                *albedo += a;
             }
-            let n = rays as f32;
+            let per_albedo =
+                |(radiance, albedo): (Vec3, Vec3)| radiance / albedo.max(Vec3::splat(1e-6));
+            let all = (sums.iter()).fold((Vec3::ZERO, Vec3::ZERO), |all, sum| {
+                (all.0 + sum.0, all.1 + sum.1)
+            });
             Some(GridPoint {
                 x,
                 y,
-                radiance: radiance / n,
-                light: radiance / albedo.max(Vec3::splat(1e-6)),
+                radiance: all.0 / rays as f32,
+                light: per_albedo(all),
+                groups: sums.map(per_albedo),
             })
         })
         .collect();
@@ -367,57 +405,6 @@ fn trace_grid(scene: &mut PackedScene, seen: &[Seen], spec: GridSpec, meter: &Me
         height,
         points,
     }
-}
-
-/// E / pi of every pixel with a wanted surface: the grid's estimates, weighted by distance, depth and normal.
-fn light_on_surfaces(
-    scene: &mut PackedScene,
-    seen: &[Seen],
-    spec: GridSpec,
-    meter: &Meter<'_>,
-) -> Vec<Vec3> {
-    let grid = trace_grid(scene, seen, spec, meter);
-    let width = scene.frame.width as usize;
-    seen.par_iter()
-        .enumerate()
-        .map(|(pixel, s)| {
-            if s.depth_m <= 0.0 {
-                return Vec3::ZERO;
-            }
-            let (x, y) = (pixel % width, pixel / width);
-            let (gx, gy) = ((x / spec.pitch_px) as isize, (y / spec.pitch_px) as isize);
-            let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-            for dy in -FILTER_RADIUS..=FILTER_RADIUS {
-                for dx in -FILTER_RADIUS..=FILTER_RADIUS {
-                    let (cx, cy) = (gx + dx, gy + dy);
-                    if cx < 0 || cy < 0 || cx >= grid.width as isize || cy >= grid.height as isize {
-                        continue;
-                    }
-                    let Some(point) = &grid.points[cy as usize * grid.width + cx as usize] else {
-                        continue;
-                    };
-                    let there = &seen[point.y * width + point.x];
-                    let away =
-                        (point.x as f32 - x as f32).powi(2) + (point.y as f32 - y as f32).powi(2);
-                    let pitch = spec.pitch_px as f32;
-                    let depth_step = (there.depth_m - s.depth_m)
-                        / (s.depth_m * DEPTH_TOLERANCE * (1.0 + away.sqrt() / pitch));
-                    let weight = (-away / (2.0 * pitch * pitch)).exp()
-                        * (-depth_step * depth_step).exp()
-                        * there.normal.dot(s.normal).max(0.0).powi(NORMAL_POWER);
-                    // Keeps a pixel whose neighbours are all unlike it defined.
-                    let weight = weight + 1e-9;
-                    sum += point.light * weight;
-                    weights += weight;
-                }
-            }
-            if weights > 0.0 {
-                sum / weights
-            } else {
-                Vec3::ZERO
-            }
-        })
-        .collect()
 }
 
 /// [`FIRST_ALBEDO`] for every pixel and every object.

@@ -19,8 +19,9 @@ const LARGEST_FACTOR: f32 = 16.0;
 const NEAR_BLOCKS: usize = 1;
 const WIDE_BLOCKS: usize = 5;
 const WIDE_WEIGHT: f32 = 8.0;
-/// Standard error that a real pixel shall have at the most, linear: about ten codes of a mid grey.
-const VISIBLE_ERROR: f32 = 0.04;
+/// Standard error that a real pixel shall have at the most, linear: about five codes of a mid grey. For that it takes this many samples a ray at the most.
+const VISIBLE_ERROR: f32 = 0.02;
+const LARGEST_VISIBLE_FACTOR: f32 = 32.0;
 /// What geometry tells is believed this far: at least this times the importance is evaluated.
 const IMPORTANCE_SHARE: f32 = 0.25;
 
@@ -94,7 +95,7 @@ impl Expected {
     fn with_visible(&self, rates: Rates, rays: f32, share: f32) -> Rates {
         let rate = share * self.difference.error / (rays * VISIBLE_ERROR * VISIBLE_ERROR);
         Rates {
-            difference: rates.difference.max(rate.min(LARGEST_FACTOR)),
+            difference: rates.difference.max(rate.min(LARGEST_VISIBLE_FACTOR)),
             ..rates
         }
     }
