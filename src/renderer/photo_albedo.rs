@@ -45,7 +45,7 @@ const ROUNDS: [GridSpec; 2] = [GridSpec { rays: 8, ..GRID }, GridSpec { rays: 12
 const ROUGH_PITCH_PX: usize = 24;
 const ROUGH_POINTS: usize = 200;
 const ROUGH_RAYS: u32 = 8;
-/// Relative difference in depth up to which the camera sees the point itself.
+/// Relative difference in depth up to which two places are one surface.
 const DEPTH_TOLERANCE: f32 = 0.02;
 /// Of a grid point's rays, whose differences tell how sure its light is.
 const GROUPS: usize = 4;

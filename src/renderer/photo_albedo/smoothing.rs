@@ -9,12 +9,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::unoccluded::Unoccluded;
-use super::{Grid, GridPoint, Seen};
+use super::{DEPTH_TOLERANCE, Grid, GridPoint, Seen};
 use crate::math::luminance;
 use crate::packed::PackedScene;
 
-/// Relative tolerance of the depth from point to point; power of the cosine between normals.
-const DEPTH_TOLERANCE: f32 = 0.02;
+/// Power of the cosine between normals.
 const NORMAL_POWER: i32 = 4;
 /// Grid points to either side that are averaged, and the standard deviation of their weights.
 const AVERAGED: usize = 6;

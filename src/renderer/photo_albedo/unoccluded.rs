@@ -62,7 +62,8 @@ impl Unoccluded {
         }
     }
 
-    /// Radiance per unit of albedo, of a surface at a place relative to the anchor with that unit normal. About: the environment's to a tenth.
+    /// Radiance per unit of albedo, of a surface at a place relative to the anchor with that unit normal: an estimate, as of the
+    /// environment the second order leaves a tenth open.
     pub fn light(&self, scene: &PackedScene, position: Vec3, normal: Vec3) -> Vec3 {
         let coefficients = self.environment.iter().zip(COSINE_OVER_PI);
         let environment: Vec3 = (coefficients.zip(harmonics(normal)))
